@@ -13,7 +13,6 @@ namespace {
 
 using Eigen::Matrix3d;
 
-constexpr double kNear = 1.6;     // edges between triangles' middles: nearer ones go cell by cell
 constexpr double kSliver = 0.02;  // share of a hat at which what bears is held off by as much as it gives way
 constexpr double kStiffest = 1e8;
 constexpr double kCutInFull = 0.1;  // of a hat: it counts as cut in full from where so much of it has another density
@@ -79,7 +78,6 @@ void add_cut_compliance(Eigen::MatrixXd& compliance, const CutHats& cuts, const 
     const bool is_cut = next_cut != cuts.triangles.end() && next_cut->triangle == t;
     const std::vector<DensityCell> whole = is_cut ? uncut(surface, *next_cut) : whole_cells(surface, t);
     DensityTriangle& part = parts.emplace_back(is_cut ? next_cut->cells : whole, whole);
-    part.is_cut = is_cut;
     part.middle = (surface.vertices[index[0]] + surface.vertices[index[1]] + surface.vertices[index[2]]) / 3.0;
     part.first = axes_of_all[own].col(1);
     part.second = axes_of_all[own].col(2);
@@ -89,18 +87,14 @@ void add_cut_compliance(Eigen::MatrixXd& compliance, const CutHats& cuts, const 
   if (parts.empty()) return;
   mean_area /= static_cast<double>(parts.size());
   const double edge = std::sqrt(mean_area * 4.0 / std::sqrt(3.0));
-  const double near = kNear * edge;
   const HalfSpaceResponse half_space(gel.material, gel.thickness, edge);
   const Eigen::Index each = normal_only ? 1 : 3;  // rows of a vertex in the responses
   const Eigen::Index rows = each * static_cast<Eigen::Index>(vertices.size());
-  DensityPairs pairs(half_space, static_cast<int>(vertices.size()), normal_only);
-  for (std::size_t a = 0; a < parts.size(); ++a) {
-    for (std::size_t b = a; b < parts.size(); ++b) {
-      if (!parts[a].is_cut && !parts[b].is_cut) continue;
-      pairs.add(parts[a], parts[b], (parts[a].middle - parts[b].middle).norm() < near);
-    }
+  std::vector<DensityVertex> places;
+  for (const int v : vertices) {
+    places.push_back({surface.vertices[v], axes_of_all[v].col(1), axes_of_all[v].col(2), place_in(cuts, v) >= 0});
   }
-  DensityPairs::Responses response = pairs.take();
+  DensityResponses response = density_responses(half_space, places, parts, edge, normal_only);
   Eigen::MatrixXd& cut_response = response.cut;
   const Eigen::MatrixXd& whole_response = response.whole;
   // Among cut hats near each other: the half-space's response to their densities, and a smooth rest.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 #include <utility>
 
 #include "core/wide_clones.h"
@@ -17,6 +18,13 @@ using Eigen::Vector3d;
 const double kSelf = 16.0 / (3.0 * std::sqrt(std::numbers::pi));
 // Variance of a triangle's points along an axis, of its area (equilateral).
 constexpr double kSpread = 0.0962;
+// Edges between triangles' middles: nearer ones go cell by cell.
+constexpr double kNear = 1.6;
+// Edges between vertices: farther ones go by their densities' moments.
+constexpr double kFar = 2.2;
+// Edges: triangles whose middles are farther apart have no vertices nearer than kFar, were it for triangles of twice
+// the mean edge.
+constexpr double kNoneNear = kFar + 2.4;
 
 /// A cell that sees others.
 struct Seeing {
@@ -86,6 +94,226 @@ TS_WIDE_CLONES void add_products(const double* __restrict of_cells, int terms, i
   }
 }
 
+/// Sums over pairs of vertices, triangle by triangle where they are near each other.
+class DensityPairs {
+ public:
+  DensityPairs(const HalfSpaceResponse& half_space, const std::vector<DensityVertex>& vertices, double edge,
+               bool normal_only)
+      : half_space_(half_space),
+        vertices_(vertices),
+        edge_(edge),
+        normal_only_(normal_only),
+        near_(static_cast<Eigen::Index>(vertices.size()), static_cast<Eigen::Index>(vertices.size())) {
+    const Eigen::Index rows = (normal_only ? 1 : 3) * near_.rows();
+    result_.cut = result_.whole = Eigen::MatrixXd::Zero(rows, rows);
+    for (Eigen::Index l = 0; l < near_.cols(); ++l) {
+      for (Eigen::Index k = 0; k < near_.rows(); ++k) {
+        near_(k, l) = (of(k).is_cut || of(l).is_cut) && (of(k).at - of(l).at).norm() < kFar * edge;
+      }
+    }
+  }
+
+  DensityResponses sum(const std::vector<DensityTriangle>& triangles) {
+    for (std::size_t a = 0; a < triangles.size(); ++a) {
+      for (std::size_t b = a; b < triangles.size(); ++b) {
+        const double distance2 = (triangles[a].middle - triangles[b].middle).squaredNorm();
+        if (distance2 < std::pow(kNear * edge_, 2)) {
+          add_near(triangles[a], triangles[b]);
+        } else if (distance2 < std::pow(kNoneNear * edge_, 2)) {
+          add_centres(triangles[a], triangles[b]);
+        }
+      }
+    }
+    add_far(triangles);
+    for (Eigen::MatrixXd* half : {&result_.cut, &result_.whole}) {
+      half->triangularView<Eigen::StrictlyUpper>() = half->transpose();
+    }
+    return std::move(result_);
+  }
+
+ private:
+  static constexpr int kTerms = FarDensities::kTerms;
+
+  /// The densities of two triangles' cells, and where their response goes.
+  struct Weighed {
+    const Eigen::MatrixX3d& a;
+    const Eigen::MatrixX3d& b;
+    Eigen::MatrixXd& out;
+  };
+
+  const DensityVertex& of(Eigen::Index k) const { return vertices_[static_cast<std::size_t>(k)]; }
+  bool wanted(const DensityTriangle& a, int i, const DensityTriangle& b, int j) const {
+    return a.place[i] >= 0 && b.place[j] >= 0 && near_(a.place[i], b.place[j]);
+  }
+
+  void add_near(const DensityTriangle& a, const DensityTriangle& b) {
+    bool any = false;
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) any = any || wanted(a, i, b, j);
+    }
+    if (!any) return;
+    const std::array<Weighed, 2> sets{Weighed{a.now.cells.density, b.now.cells.density, result_.cut},
+                                      Weighed{a.whole.cells.density, b.whole.cells.density, result_.whole}};
+    const std::span<const Weighed> all(sets);
+    if (a.same_cells && b.same_cells) {
+      add_cells(a, a.now.cells, b, b.now.cells, all);
+    } else {
+      add_cells(a, a.now.cells, b, b.now.cells, all.first(1));
+      add_cells(a, a.whole.cells, b, b.whole.cells, all.last(1));
+    }
+  }
+
+  void add_cells(const DensityTriangle& a, const CellColumns& in_a, const DensityTriangle& b, const CellColumns& in_b,
+                 std::span<const Weighed> sets) {
+    const bool same = &a == &b;
+    const int count = in_b.size();
+    const auto n = static_cast<std::size_t>(count);
+    const int terms = normal_only_ ? 1 : kTerms;
+    const double nu = half_space_.nu;
+    const std::array<double, 6> axes{a.first[0], a.first[1], a.first[2], a.second[0], a.second[1], a.second[2]};
+    from_.resize(3 * n);
+    inverse_.resize(n);
+    terms_.resize(static_cast<std::size_t>(terms) * n);
+    const std::size_t of_set = static_cast<std::size_t>(3 * terms) * n;
+    sums_.assign(sets.size() * of_set, 0.0);
+    double* const dx = from_.data();
+    double* const dy = dx + count;
+    double* const dz = dy + count;
+    for (int k = 0; k < in_a.size(); ++k) {
+      const Seeing cell{in_a.at(k, 0), in_a.at(k, 1), in_a.at(k, 2), in_a.area[k], in_a.largest[k]};
+      see(cell, in_b.at.col(0).data(), in_b.at.col(1).data(), in_b.at.col(2).data(), in_b.area.data(),
+          in_b.largest.data(), count, dx, dy, dz, inverse_.data());
+      if (normal_only_) {
+        for (int j = 0; j < count; ++j) terms_[j] = (1.0 - nu) * inverse_[j];
+      } else {
+        see_terms(nu, axes.data(), dx, dy, dz, inverse_.data(), count, terms_.data());
+        if (same) terms_[3 * count + k] = terms_[5 * count + k] = 0.5 * nu * inverse_[k];
+      }
+      if (half_space_.fade > 0.0) {
+        for (int j = 0; j < count; ++j) {
+          const double faded = half_space_.faded(std::sqrt(dx[j] * dx[j] + dy[j] * dy[j] + dz[j] * dz[j]));
+          for (int term = 0; term < terms; ++term) terms_[term * count + j] *= faded;
+        }
+      }
+      for (std::size_t s = 0; s < sets.size(); ++s) {
+        const auto density = sets[s].a.row(k);
+        add_products(terms_.data(), terms, count, density[0], density[1], density[2], sums_.data() + s * of_set);
+      }
+    }
+    for (std::size_t s = 0; s < sets.size(); ++s) {
+      const Eigen::Map<const Eigen::MatrixXd> sums(sums_.data() + s * of_set, count, 3 * terms);
+      const Eigen::Matrix<double, Eigen::Dynamic, 3> u =
+          half_space_.scale * Eigen::Matrix<double, Eigen::Dynamic, 3>(sums.transpose().lazyProduct(sets[s].b));
+      for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j) {
+          if (!wanted(a, i, b, j)) continue;
+          const auto of_term = [&](int term) { return u(3 * term + i, j); };
+          add_block(sets[s].out, a.place[i], b.place[j], block_of(of_term), same);
+        }
+      }
+    }
+  }
+
+  void add_centres(const DensityTriangle& a, const DensityTriangle& b) {
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        if (!wanted(a, i, b, j)) continue;
+        add_centres(a, a.now.corner[i], b.now.corner[j], {a.place[i], b.place[j]}, result_.cut);
+        add_centres(a, a.whole.corner[i], b.whole.corner[j], {a.place[i], b.place[j]}, result_.whole);
+      }
+    }
+  }
+  void add_centres(const DensityTriangle& a, const DensityMoments& one, const DensityMoments& other,
+                   const std::array<int, 2>& place, Eigen::MatrixXd& out) {
+    if (!(one.mass > 0.0) || !(other.mass > 0.0)) return;
+    const Vector3d from = one.centre - other.centre;
+    const Matrix3d block =
+        one.mass * other.mass * half_space_.between(a.first.dot(from), a.second.dot(from), from.squaredNorm());
+    add_block(out, place[0], place[1], block, false);
+  }
+
+  /// What vertices do to each other that aren't near.
+  void add_far(const std::vector<DensityTriangle>& triangles) {
+    std::vector<DensityMoments> cut(vertices_.size());
+    std::vector<DensityMoments> whole(vertices_.size());
+    for (const DensityTriangle& triangle : triangles) {
+      for (int i = 0; i < 3; ++i) {
+        if (triangle.place[i] < 0) continue;
+        const auto k = static_cast<std::size_t>(triangle.place[i]);
+        whole[k].add(triangle.whole.corner[i]);
+        if (vertices_[k].is_cut) cut[k].add(triangle.now.corner[i]);
+      }
+    }
+    for (std::size_t k = 0; k < vertices_.size(); ++k) {
+      if (!vertices_[k].is_cut) cut[k] = whole[k];
+    }
+    FarDensities far(half_space_, normal_only_);
+    std::vector<int> places;
+    std::vector<const DensityMoments*> others;
+    for (Eigen::Index k = 0; k < near_.rows(); ++k) {
+      for (const auto& [moments, out] : {std::pair{&cut, &result_.cut}, std::pair{&whole, &result_.whole}}) {
+        const DensityMoments& own = (*moments)[static_cast<std::size_t>(k)];
+        if (!(own.mass > 0.0)) continue;
+        places.clear();
+        others.clear();
+        for (Eigen::Index l = k + 1; l < near_.rows(); ++l) {
+          const DensityMoments& other = (*moments)[static_cast<std::size_t>(l)];
+          if (near_(l, k) || !(of(k).is_cut || of(l).is_cut) || !(other.mass > 0.0)) continue;
+          places.push_back(static_cast<int>(l));
+          others.push_back(&other);
+        }
+        if (others.empty()) continue;
+        const Eigen::ArrayXXd& terms = far.responses(own, of(k).first, of(k).second, others);
+        for (std::size_t j = 0; j < places.size(); ++j) {
+          const auto of_term = [&](int term) { return terms(static_cast<Eigen::Index>(j), term); };
+          add_block(*out, static_cast<int>(k), places[j], block_of(of_term), false);
+        }
+      }
+    }
+  }
+
+  /// A response at a row's vertex to a traction at a column's. Of normal rows alone only its first number is set.
+  Matrix3d block_of(const auto& of_term) const {
+    Matrix3d block;
+    if (normal_only_) {
+      block(0, 0) = of_term(0);
+    } else {
+      block << of_term(0), of_term(1), of_term(2), -of_term(1), of_term(0) + of_term(3), of_term(4), -of_term(2),
+          of_term(4), of_term(0) + of_term(5);
+    }
+    return block;
+  }
+
+  /// Into the lower half. `all`: of vertices of one triangle, whose pairs are added in both orders.
+  void add_block(Eigen::MatrixXd& out, int row, int column, const Matrix3d& block, bool all) const {
+    if (normal_only_) {
+      if (row == column && !all) {
+        out(row, column) += 2.0 * block(0, 0);
+      } else if (row >= column) {
+        out(row, column) += block(0, 0);
+      } else if (!all) {
+        out(column, row) += block(0, 0);
+      }
+      return;
+    }
+    if (row == column && !all) {
+      out.block<3, 3>(3 * row, 3 * column) += block + block.transpose();
+    } else if (row >= column) {
+      out.block<3, 3>(3 * row, 3 * column) += block;
+    } else if (!all) {
+      out.block<3, 3>(3 * column, 3 * row) += block.transpose();
+    }
+  }
+
+  const HalfSpaceResponse& half_space_;
+  const std::vector<DensityVertex>& vertices_;
+  double edge_;
+  bool normal_only_;
+  Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> near_;
+  DensityResponses result_;
+  std::vector<double> from_, inverse_, terms_, sums_;  // for each cell that is seen
+};
+
 }  // namespace
 
 CellColumns::CellColumns(const std::vector<DensityCell>& list) {
@@ -102,14 +330,19 @@ CellColumns::CellColumns(const std::vector<DensityCell>& list) {
   largest = kSelf / area.sqrt();
 }
 
-TriangleDensity::TriangleDensity(const std::vector<DensityCell>& list) : cells(list), mass(Vector3d::Zero()) {
-  centre.fill(Vector3d::Zero());
-  for (const DensityCell& cell : list) {
-    mass += cell.density;
-    for (int a = 0; a < 3; ++a) centre[a] += cell.density[a] * cell.at;
-  }
+TriangleDensity::TriangleDensity(const std::vector<DensityCell>& list) : cells(list) {
   for (int a = 0; a < 3; ++a) {
-    if (mass[a] > 0.0) centre[a] /= mass[a];
+    DensityMoments& moments = corner[a];
+    for (const DensityCell& cell : list) {
+      moments.mass += cell.density[a];
+      moments.centre += cell.density[a] * cell.at;
+    }
+    if (!(moments.mass > 0.0)) continue;
+    moments.centre /= moments.mass;
+    for (const DensityCell& cell : list) {
+      const Vector3d away = cell.at - moments.centre;
+      moments.spread += cell.density[a] / moments.mass * away * away.transpose();
+    }
   }
 }
 
@@ -119,141 +352,9 @@ DensityTriangle::DensityTriangle(const std::vector<DensityCell>& with_cut, const
       same_cells(now.cells.size() == whole.cells.size() && (now.cells.at == whole.cells.at).all() &&
                  (now.cells.area == whole.cells.area).all()) {}
 
-DensityPairs::DensityPairs(const HalfSpaceResponse& half_space, int vertices, bool normal_only)
-    : half_space_(half_space), normal_only_(normal_only) {
-  const Eigen::Index rows = (normal_only ? 1 : 3) * static_cast<Eigen::Index>(vertices);
-  near_.cut = near_.whole = Eigen::MatrixXd::Zero(rows, rows);
-  for (Far* far : {&far_cut_, &far_whole_}) {
-    far->columns = Eigen::MatrixXd::Zero(rows, normal_only ? 3 : 9);
-    far->sum = Eigen::MatrixXd::Zero(rows, rows);
-  }
-}
-
-void DensityPairs::add(const DensityTriangle& a, const DensityTriangle& b, bool near) {
-  if (!near) {
-    if (at_ != &a) {
-      gather();
-      at_ = &a;
-    }
-    add_far(a, a.now, b, b.now, far_cut_.columns);
-    add_far(a, a.whole, b, b.whole, far_whole_.columns);
-    return;
-  }
-  const std::array<Weighed, 2> sets{Weighed{a.now.cells.density, b.now.cells.density, near_.cut},
-                                    Weighed{a.whole.cells.density, b.whole.cells.density, near_.whole}};
-  const std::span<const Weighed> all(sets);
-  if (a.same_cells && b.same_cells) {
-    add_cells(a, a.now.cells, b, b.now.cells, all);
-  } else {
-    add_cells(a, a.now.cells, b, b.now.cells, all.first(1));
-    add_cells(a, a.whole.cells, b, b.whole.cells, all.last(1));
-  }
-}
-
-void DensityPairs::add_cells(const DensityTriangle& a, const CellColumns& in_a, const DensityTriangle& b,
-                             const CellColumns& in_b, std::span<const Weighed> sets) {
-  const bool same = &a == &b;
-  const int count = in_b.size();
-  const auto n = static_cast<std::size_t>(count);
-  const int terms = normal_only_ ? 1 : kTerms;
-  const double nu = half_space_.nu;
-  const std::array<double, 6> axes{a.first[0], a.first[1], a.first[2], a.second[0], a.second[1], a.second[2]};
-  from_.resize(3 * n);
-  inverse_.resize(n);
-  terms_.resize(static_cast<std::size_t>(terms) * n);
-  const std::size_t of_set = static_cast<std::size_t>(3 * terms) * n;
-  sums_.assign(sets.size() * of_set, 0.0);
-  double* const dx = from_.data();
-  double* const dy = dx + count;
-  double* const dz = dy + count;
-  for (int k = 0; k < in_a.size(); ++k) {
-    const Seeing cell{in_a.at(k, 0), in_a.at(k, 1), in_a.at(k, 2), in_a.area[k], in_a.largest[k]};
-    see(cell, in_b.at.col(0).data(), in_b.at.col(1).data(), in_b.at.col(2).data(), in_b.area.data(),
-        in_b.largest.data(), count, dx, dy, dz, inverse_.data());
-    if (normal_only_) {
-      for (int j = 0; j < count; ++j) terms_[j] = (1.0 - nu) * inverse_[j];
-    } else {
-      see_terms(nu, axes.data(), dx, dy, dz, inverse_.data(), count, terms_.data());
-      if (same) terms_[3 * count + k] = terms_[5 * count + k] = 0.5 * nu * inverse_[k];
-    }
-    if (half_space_.fade > 0.0) {
-      for (int j = 0; j < count; ++j) {
-        const double faded = half_space_.faded(std::sqrt(dx[j] * dx[j] + dy[j] * dy[j] + dz[j] * dz[j]));
-        for (int term = 0; term < terms; ++term) terms_[term * count + j] *= faded;
-      }
-    }
-    for (std::size_t s = 0; s < sets.size(); ++s) {
-      const auto density = sets[s].a.row(k);
-      add_products(terms_.data(), terms, count, density[0], density[1], density[2], sums_.data() + s * of_set);
-    }
-  }
-  for (std::size_t s = 0; s < sets.size(); ++s) {
-    const Eigen::Map<const Eigen::MatrixXd> sums(sums_.data() + s * of_set, count, 3 * terms);
-    const Eigen::Matrix<double, Eigen::Dynamic, 3> u =
-        half_space_.scale * Eigen::Matrix<double, Eigen::Dynamic, 3>(sums.transpose().lazyProduct(sets[s].b));
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) {
-        Matrix3d block;
-        if (normal_only_) {
-          block(0, 0) = u(i, j);
-        } else {
-          const auto of = [&](int term) { return u(3 * term + i, j); };
-          block << of(0), of(1), of(2), -of(1), of(0) + of(3), of(4), -of(2), of(4), of(0) + of(5);
-        }
-        add_block(sets[s].out, a.place[i], b.place[j], block, !same);
-      }
-    }
-  }
-}
-
-void DensityPairs::add_far(const DensityTriangle& a, const TriangleDensity& of_a, const DensityTriangle& b,
-                           const TriangleDensity& of_b, Eigen::MatrixXd& columns) {
-  for (int i = 0; i < 3; ++i) {
-    if (a.place[i] < 0 || !(of_a.mass[i] > 0.0)) continue;
-    for (int j = 0; j < 3; ++j) {
-      if (b.place[j] < 0 || !(of_b.mass[j] > 0.0)) continue;
-      const Vector3d from = of_a.centre[i] - of_b.centre[j];
-      const double mass = of_a.mass[i] * of_b.mass[j];
-      if (normal_only_) {
-        columns(b.place[j], i) +=
-            mass * half_space_.scale * (1.0 - half_space_.nu) * half_space_.faded(from.norm()) / from.norm();
-      } else {
-        columns.block<3, 3>(3 * b.place[j], 3 * i) +=
-            mass * half_space_.between(a.first.dot(from), a.second.dot(from), from.squaredNorm()).transpose();
-      }
-    }
-  }
-}
-
-void DensityPairs::gather() {
-  if (at_ == nullptr) return;
-  const Eigen::Index each = normal_only_ ? 1 : 3;
-  for (Far* far : {&far_cut_, &far_whole_}) {
-    for (int i = 0; i < 3; ++i) {
-      if (at_->place[i] < 0) continue;
-      far->sum.middleCols(each * at_->place[i], each) += far->columns.middleCols(each * i, each);
-    }
-    far->columns.setZero();
-  }
-}
-
-DensityPairs::Responses DensityPairs::take() {
-  gather();
-  near_.cut += far_cut_.sum + far_cut_.sum.transpose();
-  near_.whole += far_whole_.sum + far_whole_.sum.transpose();
-  return std::move(near_);
-}
-
-/// `mirrored`: to the other place, too. Of the block only its first row and column if there are normal rows alone.
-void DensityPairs::add_block(Eigen::MatrixXd& out, int row, int column, const Matrix3d& block, bool mirrored) {
-  if (row < 0 || column < 0) return;
-  if (normal_only_) {
-    out(row, column) += block(0, 0);
-    if (mirrored) out(column, row) += block(0, 0);
-    return;
-  }
-  out.block<3, 3>(3 * row, 3 * column) += block;
-  if (mirrored) out.block<3, 3>(3 * column, 3 * row) += block.transpose();
+DensityResponses density_responses(const HalfSpaceResponse& half_space, const std::vector<DensityVertex>& vertices,
+                                   const std::vector<DensityTriangle>& triangles, double edge, bool normal_only) {
+  return DensityPairs(half_space, vertices, edge, normal_only).sum(triangles);
 }
 
 }  // namespace touchstone::fem

@@ -415,7 +415,16 @@ ContactAnswer solve_frictional(const ContactProblem& problem, const Eigen::Vecto
   ContactAnswer begin;
   begin.z = start;
   if (start.size() == 0) begin = frictionless_start(problem);
-  return newton_with_sweeps(problem, begin.z, begin.shift, tolerance, memory);
+  ContactAnswer answer = newton_with_sweeps(problem, begin.z, begin.shift, tolerance, memory);
+  if (answer.converged || start.size() == 0) return answer;
+  // Tractions from far off, as of an object that could be led on by a part only, may leave nobody to carry the force.
+  begin = frictionless_start(problem);
+  memory.forget();
+  ContactAnswer again = newton_with_sweeps(problem, begin.z, begin.shift, tolerance, memory);
+  again.iterations += answer.iterations;
+  again.factorisations += answer.factorisations;
+  again.sweeps += answer.sweeps;
+  return again;
 }
 
 }  // namespace touchstone::fem

@@ -27,6 +27,7 @@ struct Path {
   PressSnapshot start;
   std::vector<PartTarget> to;
   double seconds = 0.0;
+  bool first_touch = false;  ///< with friction
 };
 
 struct Effort {
@@ -268,6 +269,7 @@ double Press::Parts::add_segment(std::size_t b, const PressTarget& target, Path&
     }
     start.pose = touch.value_or(to.pose);
     if (!touch) clear = 1.0;
+    path.first_touch = path.first_touch || (meets && friction(b) > 0.0);
   }
   if (!here.touching || no_force) path.start.forget(static_cast<int>(b));
   if (!meets)
@@ -326,7 +328,8 @@ PressSnapshot Press::Parts::follow(std::span<const PressTarget> targets, Effort&
   return *end;
 }
 
-/// The path in equal parts no longer than the tolerance allows, each halved where it must be.
+/// The path in equal parts no longer than the tolerance allows, or in those of a first touch, each halved where it must
+/// be.
 std::optional<PressSnapshot> Press::Parts::walk(const Path& path, int halvings, Effort& effort) {
   int parts = 1;
   for (std::size_t b = 0; b < path.to.size(); ++b) {
@@ -343,13 +346,18 @@ std::optional<PressSnapshot> Press::Parts::walk(const Path& path, int halvings, 
     }
     parts = std::max(parts, static_cast<int>(wanted));
   }
+  const bool doubling = path.first_touch && parts < tolerance.touch_parts;
+  if (doubling) parts = tolerance.touch_parts;
   PressSnapshot at = path.start;
-  for (int part = 0; part < parts; ++part) {
-    const double begin = static_cast<double>(part) / parts;
-    const double end = part + 1 == parts ? 1.0 : static_cast<double>(part + 1) / parts;
+  double begin = 0.0;
+  for (int part = 1; part <= parts; ++part) {
+    const double end = part == parts ? 1.0
+                       : doubling    ? std::ldexp(1.0, part - parts)
+                                     : static_cast<double>(part) / parts;
     auto next = advance(path, at, begin, end, halvings, effort);
     if (!next) return std::nullopt;
     at = std::move(*next);
+    begin = end;
   }
   return at;
 }

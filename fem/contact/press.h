@@ -62,10 +62,15 @@ struct PressTolerance {
   double largest_motion =
       std::numeric_limits<double>::infinity();  ///< mm: steps with friction are cut into equal parts
                                                 ///< whose translations are no longer than this
-  int most_halvings = 7;                        ///< of a step that doesn't converge
-  bool outlines = true;                         ///< hats are cut by what bodies cover (see cut_hats.h); false: they are
-                                                ///< whole, as at finite strain, for comparisons with that
-  int most_factorisations = 300;                ///< of the whole gel in a step at finite strain, which then gives up
+  /// Of a step with friction in which a body first touches, with fewer parts than this: so many, each of which
+  /// ends twice as far as the one before. What sticks keeps the place along the body that it had when it was touched,
+  /// so the displacement along the surface needs parts, the force hardly does: in one part of a sphere's press it was
+  /// off by 0.37 to 0.60 (root of the mean square, of its own), the depth by 0.1 %; in four by 0.16 to 0.27 and 0.04 %.
+  int touch_parts = 1;
+  int most_halvings = 7;          ///< of a step that doesn't converge
+  bool outlines = true;           ///< hats are cut by what bodies cover (see cut_hats.h); false: they are
+                                  ///< whole, as at finite strain, for comparisons with that
+  int most_factorisations = 300;  ///< of the whole gel in a step at finite strain, which then gives up
 };
 
 /// What a step computes.

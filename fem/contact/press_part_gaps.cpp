@@ -75,7 +75,7 @@ WeightedGap PartSolver::gap_of(std::size_t b, const Iterate& now, PartEffort& ef
   const GapReach reach = surface_.flat ? GapReach{now.reach + kLeastReach * gel_.thickness, 1.5 * kBulge} : GapReach{};
   const auto evaluate = [&] {
     const double hold = now.updates < kCutUpdates ? kCutsHold : kCutsHoldLate;
-    const bool kept = now.updates > 0 && cached.gap.cuts && cuts_hold(cached, body, hold);
+    const bool kept = cached.gap.cuts && cuts_hold(cached, body, hold);
     std::vector<std::array<double, 2>> bent = std::move(cached.gap.bent);
     const double away = surface_.normals.front().dot(body.pose.translation - cached.pose.translation);
     cached.gap =
@@ -98,7 +98,10 @@ WeightedGap PartSolver::gap_of(std::size_t b, const Iterate& now, PartEffort& ef
   };
   if (!cached.valid || cached.pose.rotation != body.pose.rotation) return evaluate();
   const Eigen::Vector3d motion = body.pose.translation - cached.pose.translation;
-  if (motion.z() != 0.0 && cached.gap.overlap_cuts_after(motion.z())) return evaluate();
+  if (motion.z() != 0.0 && cached.gap.overlap_cuts_after(motion.z())) {
+    const double hold = now.updates < kCutUpdates ? kCutsHold : kCutsHoldLate;
+    if (!cached.gap.cuts || !cuts_hold(cached, body, hold)) return evaluate();
+  }
   const auto n = static_cast<Eigen::Index>(gel_.vertices.size());
   Eigen::MatrixX2d slid = Eigen::MatrixX2d::Zero(n, 2);  // of the gel under the body
   for (Eigen::Index v = 0; v < n; ++v) {
@@ -109,7 +112,7 @@ WeightedGap PartSolver::gap_of(std::size_t b, const Iterate& now, PartEffort& ef
   const double farthest = std::sqrt(slid.rowwise().squaredNorm().maxCoeff());
   if (farthest > std::sqrt(lookup_mm_ * kSharpestCurve * size_)) return evaluate();
   WeightedGap gap = cached.gap;
-  if (farthest > 0.0) {
+  if (farthest > lookup_mm_) {  // nearer than the lookup is known it makes no difference
     if (!cached.has_slopes) {
       cached.plain_slope = cached.edge_slope = Eigen::MatrixX2d::Zero(n, 2);
       const double step = kSlopeStep * size_;

@@ -191,6 +191,47 @@ TEST(Press, ForceAndPoseControlAgree) {
   EXPECT_NEAR(by_force.state().gel_from_object.translation.z(), kRadius - 0.2, 1e-9);
 }
 
+// From the first touch to the whole force at once: what the first look at the gel gives, a few vertices that carry all
+// of it, must not lead to smaller parts of the step.
+TEST(Press, AFirstPressByForceWithFrictionTakesOnePart) {
+  for (const double force : {0.2, 1.0, 3.0}) {
+    PressTarget target = sphere_at(0.03, 0.02, 0.0);
+    target.axis[2] = AxisControl::with_force(force);
+    Press press(gel(), SphereShape{kRadius}, 0.5, tight());
+    const PressState& state = press.step(target);
+    EXPECT_EQ(state.parts, 1) << force;
+    EXPECT_NEAR(state.wrench[2], force, 1e-6);
+  }
+}
+
+// Beside a press led to 1 N in 64 steps: the depth is nearly the same however it is reached, the displacement along the
+// surface comes nearer with each part.
+TEST(Press, PartsOfAFirstTouchBringTheDisplacementAlongTheSurface) {
+  PressTarget target = sphere_at(0.03, 0.02, 0.0);
+  Press slowly(gel(), SphereShape{kRadius}, 0.5, tight());
+  for (int k = 1; k <= 64; ++k) {
+    target.axis[2] = AxisControl::with_force(k / 64.0);
+    slowly.step(target);
+  }
+  const Eigen::MatrixX2d wanted = slowly.state().surface_displacement.leftCols<2>();
+  const double wanted_depth = kRadius - slowly.state().gel_from_object.translation.z();
+  double before = 0.5;
+  for (const int parts : {1, 2, 4}) {
+    for (const bool by_force : {true, false}) {
+      PressTolerance tolerance = tight();
+      tolerance.touch_parts = parts;
+      Press press(gel(), SphereShape{kRadius}, 0.5, tolerance);
+      const PressState& state = press.step(by_force ? target : sphere_at(0.03, 0.02, wanted_depth));
+      EXPECT_EQ(state.parts, parts);
+      EXPECT_NEAR(kRadius - state.gel_from_object.translation.z(), wanted_depth, 1e-3 * wanted_depth);
+      EXPECT_NEAR(state.wrench[2], 1.0, 2e-3);
+      const double off = (state.surface_displacement.leftCols<2>() - wanted).norm() / wanted.norm();
+      EXPECT_LT(off, parts == 4 ? 0.27 : before);
+      if (!by_force) before = off;
+    }
+  }
+}
+
 TEST(Press, NoNormalForceMeansJustTouching) {
   Press press(gel(), SphereShape{kRadius}, 0.5);
   PressTarget target = target_at(0, 0, 0);
