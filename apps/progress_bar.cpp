@@ -66,6 +66,7 @@ void ProgressBar::show(const std::string& stage, std::int64_t done, std::int64_t
     end_stage();
     stage_ = stage;
     done_ = 0;
+    first_ = done;
     begun_ = last_drawn_ = now;
     drawn_ = -1;
   }
@@ -76,7 +77,7 @@ void ProgressBar::show(const std::string& stage, std::int64_t done, std::int64_t
 
 void ProgressBar::draw(Clock::time_point now) {
   const double elapsed = seconds_between(begun_, now);
-  const double rate = elapsed > 0.0 ? static_cast<double>(done_) / elapsed : 0.0;
+  const double rate = elapsed > 0.0 ? static_cast<double>(done_ - first_) / elapsed : 0.0;
   const double part = total_ > 0 ? static_cast<double>(done_) / static_cast<double>(total_) : 0.0;
   std::string text = fmt::format("{}/{}", done_, total_);
   if (rate > 0.0) text += fmt::format("  {:.3g}/s", rate);

@@ -36,6 +36,7 @@ class ProgressBar {
   std::mutex mutex_;
   std::string stage_;
   std::int64_t done_ = 0;
+  std::int64_t first_ = 0;  // had been done when the stage began: samples go on after a unit's set-up
   std::int64_t total_ = 0;
   std::int64_t drawn_ = -1;
   Clock::time_point begun_;

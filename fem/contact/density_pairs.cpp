@@ -106,20 +106,32 @@ class DensityPairs {
         near_(static_cast<Eigen::Index>(vertices.size()), static_cast<Eigen::Index>(vertices.size())) {
     const Eigen::Index rows = (normal_only ? 1 : 3) * near_.rows();
     result_.cut = result_.whole = Eigen::MatrixXd::Zero(rows, rows);
+    const double far2 = std::pow(kFar * edge, 2);
+    near_.setZero();
     for (Eigen::Index l = 0; l < near_.cols(); ++l) {
+      if (!of(l).is_cut) continue;
       for (Eigen::Index k = 0; k < near_.rows(); ++k) {
-        near_(k, l) = (of(k).is_cut || of(l).is_cut) && (of(k).at - of(l).at).norm() < kFar * edge;
+        near_(k, l) = (of(k).at - of(l).at).squaredNorm() < far2;
+        if (near_(k, l)) near_(l, k) = true;
       }
     }
   }
 
   DensityResponses sum(const std::vector<DensityTriangle>& triangles) {
+    const double near2 = std::pow(kNear * edge_, 2);
+    const double none_near2 = std::pow(kNoneNear * edge_, 2);
+    std::vector<char> is_cut;  // one of their corners' hats is
+    for (const DensityTriangle& triangle : triangles) {
+      is_cut.push_back(std::any_of(triangle.place.begin(), triangle.place.end(),
+                                   [&](int place) { return place >= 0 && of(place).is_cut; }));
+    }
     for (std::size_t a = 0; a < triangles.size(); ++a) {
       for (std::size_t b = a; b < triangles.size(); ++b) {
+        if (!is_cut[a] && !is_cut[b]) continue;
         const double distance2 = (triangles[a].middle - triangles[b].middle).squaredNorm();
-        if (distance2 < std::pow(kNear * edge_, 2)) {
+        if (distance2 < near2) {
           add_near(triangles[a], triangles[b]);
-        } else if (distance2 < std::pow(kNoneNear * edge_, 2)) {
+        } else if (distance2 < none_near2) {
           add_centres(triangles[a], triangles[b]);
         }
       }
