@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "lab/device/camera_feed.h"
+#include "lab/device/camera_state.h"
 
 namespace touchstone::apps {
 

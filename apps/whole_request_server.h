@@ -13,6 +13,8 @@
 #include <thread>
 #include <vector>
 
+#include "apps/whole_request.h"
+
 namespace touchstone::apps {
 
 /// One thread reads from all connections that haven't sent their request yet. What it doesn't take it answers itself,
@@ -30,9 +32,7 @@ class WholeRequestServer : public httplib::Server {
   struct Connection {
     int socket = -1;
     Clock::time_point until;
-    std::string bytes = {};  // of the head and then, once that is there, of the body
-    std::string head = {};   // as it is handed over; empty: not there yet
-    std::size_t body_size = 0;
+    WholeRequest request = {};
     bool answered = false;  // what still comes is thrown away until the other side has read why
   };
 
@@ -44,7 +44,6 @@ class WholeRequestServer : public httplib::Server {
   void collect();
   void take_new();
   bool read_from(Connection& connection);
-  bool examine(Connection& connection, std::size_t seen);
   bool refuse(Connection& connection, int status, const std::string& message);
   void hand_over(int socket, std::string request);
 

@@ -405,6 +405,10 @@ std::vector<std::int64_t> Hdf5Reader::shape_of(const std::string& path, std::siz
   for (const hsize_t part : extent) {
     if (__builtin_mul_overflow(size, part, &size)) fail("{}: '{}' has more values than 64 bits count", name_, path);
   }
+  // An array of any size fits in a small file if its numbers aren't there: HDF5 makes them up as they're read.
+  if (size > 0 && !is_all_there(path, size)) {
+    fail("{}: '{}' says that it holds {} numbers, but not all of them are in the file", name_, path, size);
+  }
   return {extent.begin(), extent.end()};
 }
 
@@ -477,10 +481,15 @@ bool Hdf5Reader::is_all_there(const std::string& path, std::size_t count) const 
   }
   // Not by H5Dget_space_status, which takes packed chunks for missing ones.
   const Handle space(H5Dget_space(dataset), H5Sclose);
-  hsize_t numbers_a_chunk = 0;
+  std::array<hsize_t, H5S_MAX_RANK> sides{};
+  const int axes = H5Pget_chunk(creation, H5S_MAX_RANK, sides.data());
+  hsize_t numbers_a_chunk = 1;
+  for (int axis = 0; axis < axes; ++axis) {
+    if (__builtin_mul_overflow(numbers_a_chunk, sides[static_cast<std::size_t>(axis)], &numbers_a_chunk)) return false;
+  }
   hsize_t chunks = 0;
-  return H5Pget_chunk(creation, 1, &numbers_a_chunk) == 1 && numbers_a_chunk > 0 &&
-         H5Dget_num_chunks(dataset, space, &chunks) >= 0 && (count - 1) / numbers_a_chunk < chunks;
+  return axes > 0 && numbers_a_chunk > 0 && H5Dget_num_chunks(dataset, space, &chunks) >= 0 &&
+         (count - 1) / numbers_a_chunk < chunks;
 }
 
 std::int64_t Hdf5Reader::read_number(const std::string& path) const {
@@ -500,10 +509,6 @@ std::int64_t Hdf5Reader::count_of_whole_numbers(const std::string& path) const {
   std::size_t count = 0;
   const std::vector<std::int64_t> shape = shape_of(path, count);
   if (shape.size() != 1) fail("{}: '{}' has {} axes; allowed is one", name_, path, shape.size());
-  // A list of any length fits in a small file if its numbers aren't there: HDF5 makes them up as they're read.
-  if (count > 0 && !is_all_there(path, count)) {
-    fail("{}: '{}' says that it holds {} numbers, but not all of them are in the file", name_, path, shape[0]);
-  }
   return shape[0];
 }
 

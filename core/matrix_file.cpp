@@ -1,5 +1,6 @@
 #include "core/matrix_file.h"
 
+#include <algorithm>
 #include <bit>
 #include <cstdint>
 #include <cstring>
@@ -39,6 +40,7 @@ MatrixFile::MatrixFile(std::string_view bytes, std::string_view mark, std::strin
   rest_ = sealed.substr(mark.size());
   if (!rest_.starts_with(key)) fail("it belongs to another {}", whose);
   rest_.remove_prefix(kDigestSize);
+  most_side_ = static_cast<std::int64_t>(bytes.size() / sizeof(double));
 }
 
 Eigen::MatrixXd MatrixFile::take() {
@@ -47,7 +49,8 @@ Eigen::MatrixXd MatrixFile::take() {
   std::memcpy(size, rest_.data(), sizeof(size));
   rest_.remove_prefix(sizeof(size));
   const std::size_t numbers = rest_.size() / sizeof(double);
-  if (size[0] < 0 || size[1] < 0 ||
+  // Also a matrix of nothing has sides: who goes through 2^60 empty columns never comes back.
+  if (size[0] < 0 || size[1] < 0 || std::max(size[0], size[1]) > most_side_ ||
       (size[1] > 0 && static_cast<std::size_t>(size[0]) > numbers / static_cast<std::size_t>(size[1]))) {
     fail("it ends early");
   }

@@ -6,6 +6,7 @@
 // little-endian.
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <initializer_list>
 #include <string>
 #include <string_view>
@@ -31,6 +32,7 @@ class MatrixFile {
 
  private:
   std::string_view rest_;
+  std::int64_t most_side_ = 0;
 };
 
 }  // namespace touchstone

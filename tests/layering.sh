@@ -97,7 +97,7 @@ while IFS=: read -r folder names; do
 done <<<"$rows"
 
 declare -A tests_of=([golden]=" core render/ sim/ " [hard_cases]=" core closed_forms fem/ render/ sensors/ sim/ "
-  [fuzz]=" core sensors/ sim/ datasets/ lab/ " [support]=" core fem/ sim/ datasets/ ")
+  [fuzz]=" core fem/ render/ sensors/ sim/ datasets/ lab/ apps " [support]=" core fem/ sim/ datasets/ ")
 
 # What `folder` may include, if `target` is that.
 may_include() {

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "core/error.h"
+#include "core/named_file.h"
 #include "core/sha256.h"
 #include "core/whole_file.h"
 
@@ -71,11 +72,7 @@ std::vector<InputFile> input_files(const fs::path& root) {
 std::filesystem::path existing_file(YamlReader& in, const std::string& key) {
   std::string name;
   in.required(key, name);
-  std::filesystem::path file = in.folder() / name;
-  if (!in.describing() && !std::filesystem::is_regular_file(file)) {
-    fail_at(in.where(key), "{}{}: there is no file {}", in.context(), key, file.string());
-  }
-  return file;
+  return in.describing() ? in.folder() / name : named_file(in, key, name);
 }
 
 }  // namespace touchstone::datasets

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <set>
 
+#include "core/named_file.h"
 #include "core/short_text.h"
 
 namespace touchstone::datasets {
@@ -22,12 +23,9 @@ void fields(YamlReader& in, JobScene& scene) {
   }
   std::string file;
   in.required("scene", file);
-  scene.scene = in.folder() / file;
   in.required("split", scene.split);
   in.optional("start_mm", scene.start_mm);
-  if (!std::filesystem::is_regular_file(scene.scene)) {
-    fail_at(in.where("scene"), "scene: there is no file {}", scene.scene.string());
-  }
+  scene.scene = named_file(in, "scene", file);
 }
 
 void fields(YamlReader& in, Job& job) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/named_file.h"
 #include "core/whole_file.h"
 
 namespace touchstone::datasets {
@@ -54,9 +55,7 @@ inline double number_in(const std::string& cell, const char* field, const Source
 inline std::filesystem::path file_in(const std::filesystem::path& folder, const std::string& cell,
                                      const SourceLocation& where) {
   std::filesystem::path file = folder / cell;
-  if (cell.empty() || !std::filesystem::is_regular_file(file)) {
-    fail_at(where, "file: there is no file {}", file.string());
-  }
+  if (const std::string fault = fault_of_file(file); !fault.empty()) fail_at(where, "file: {}", fault);
   return file;
 }
 

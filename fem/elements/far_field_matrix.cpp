@@ -43,7 +43,11 @@ FarFieldMatrix::FarFieldMatrix(Parts parts, double factor) : parts_(std::move(pa
   };
   for (const Block& block : parts_.blocks) {
     check(block.row >= 0 && block.row < count && block.column >= 0 && block.column <= block.row);
-    within(block.numbers, numbers(block).rows(), numbers(block).cols());
+    // Not by numbers(block): a view that begins far beyond the file's end mustn't be made.
+    const Cluster& row = parts_.clusters[block.row];
+    const Cluster& column = parts_.clusters[block.column];
+    within(block.numbers, block.far ? row.rank : 3 * (row.last - row.first),
+           block.far ? column.rank : 3 * (column.last - column.first));
     entries += (block.row == block.column ? 1.0 : 2.0) * vertices_of(block.row) * vertices_of(block.column);
   }
   check(entries == static_cast<double>(n) * n);

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/named_file.h"
 #include "core/short_text.h"
 #include "core/whole_file.h"
 #include "datasets/jobs/input_files.h"
@@ -205,8 +206,8 @@ void fields(YamlReader& in, RecordingSpec& recording) {
   if (in.describing()) return;
   if (recording.rest.empty()) fail_at(in.where("rest"), "recording.rest: has none; at least one is needed");
   for (const std::string& name : {std::string("presses.csv"), recording.rest.front()}) {
-    if (!std::filesystem::is_regular_file(recording.folder / name)) {
-      fail_at(in.where("folder"), "recording.folder: there is no file {}", (recording.folder / name).string());
+    if (const std::string fault = fault_of_file(recording.folder / name); !fault.empty()) {
+      fail_at(in.where("folder"), "recording.folder: {}", fault);
     }
   }
 }
@@ -242,12 +243,7 @@ void fields(YamlReader& in, UnitFitSpec& fit) {
   if (fit.differences && backgrounds.empty() && !fit.recording) {
     fail_at(in.where("differences"), "differences: true, but there are no `backgrounds` that presses could be less");
   }
-  for (const std::string& name : backgrounds) {
-    fit.backgrounds.push_back(in.folder() / name);
-    if (!std::filesystem::is_regular_file(fit.backgrounds.back())) {
-      fail_at(in.where("backgrounds"), "backgrounds: there is no file {}", fit.backgrounds.back().string());
-    }
-  }
+  for (const std::string& name : backgrounds) fit.backgrounds.push_back(named_file(in, "backgrounds", name));
 }
 
 double number_at(const FitUnknown& unknown, const YamlNumber& number, double x) {

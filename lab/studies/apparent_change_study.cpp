@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "core/error.h"
+#include "core/named_file.h"
 #include "datasets/jobs/job.h"
 #include "fem/mesh/gel_body.h"
 #include "lab/press/pressed_marker.h"
@@ -195,7 +196,7 @@ void fields(YamlReader& in, ApparentChangeSpec& spec) {
   in.optional("friction", spec.friction, Allowed::at_least(0.0));
   in.optional("by", spec.by);
   if (in.describing()) return;  // the files that it names aren't there
-  spec.device = sim::read_device(in.folder() / device);
+  spec.device = sim::read_device(named_file(in, "device", device));
   if (!spec.device.gel.slab() || !spec.device.gel.layers.empty()) {
     fail_at(in.where("device"), "device: {} isn't a slab of one material, which the formula knows alone",
             spec.device.name);
@@ -217,7 +218,7 @@ void fields(YamlReader& in, ApparentChangeSpec& spec) {
   }
   if (objects.empty()) fail_at(in.where("objects"), "objects: is empty; at least one object file is needed");
   for (const std::string& file : objects) {
-    const sim::ObjectSpec object = sim::read_object(in.folder() / file);
+    const sim::ObjectSpec object = sim::read_object(named_file(in, "objects", file));
     if (object.elastic) {
       fail_at(in.where("objects"), "objects: {} is elastic; a study of this kind presses rigid ones", file);
     }

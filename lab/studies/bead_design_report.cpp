@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "core/named_file.h"
 #include "lab/studies/bead_design_study.h"
 
 namespace touchstone::sensors {
@@ -114,10 +115,10 @@ void fields(YamlReader& in, BeadDesignSpec& spec) {
   if (spec.most_N < spec.load_N) {
     fail_at(in.where("most_N"), "most_N: is {}, it must be at least load_N, {}", spec.most_N, spec.load_N);
   }
-  spec.object = sim::read_object(in.folder() / object);
-  spec.training = read_yaml<sim::MotionSpec>(in.folder() / training);
-  spec.verification = read_yaml<sim::MotionSpec>(in.folder() / verification);
-  spec.base = read_design_base(in.folder() / device);
+  spec.object = sim::read_object(named_file(in, "object", object));
+  spec.training = read_yaml<sim::MotionSpec>(named_file(in, "training", training));
+  spec.verification = read_yaml<sim::MotionSpec>(named_file(in, "verification", verification));
+  spec.base = read_design_base(named_file(in, "device", device));
   const sim::DeviceSpec& read = spec.base.device;
   if (!read.beads || !read.camera || read.coating) {
     fail_at(in.where("device"), "device: {} {}; this study needs beads in a clear gel and a camera", read.name,

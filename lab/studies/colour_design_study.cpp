@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 
+#include "core/named_file.h"
 #include "lab/chroma/chroma_marker_experiment.h"
 #include "lab/studies/centroid_bound.h"
 #include "sim/plan/scene_bands.h"
@@ -96,7 +97,7 @@ void fields(YamlReader& in, ColourDesignSpec& spec) {
   if (spec.shear_depths_mm.size() < 2 || !std::is_sorted(spec.shear_depths_mm.begin(), spec.shear_depths_mm.end())) {
     fail_at(in.where("shear_depths_mm"), "shear_depths_mm: needs two depths or more, rising");
   }
-  spec.base = read_design_base(in.folder() / device);
+  spec.base = read_design_base(named_file(in, "device", device));
   const sim::DeviceSpec& read = spec.base.device;
   if (!read.coating || !read.coating->print || !read.camera) {
     fail_at(in.where("device"), "device: {} has no {}; this study needs printed markers and a camera", read.name,

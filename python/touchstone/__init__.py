@@ -11,9 +11,21 @@ so pressing gives a positive z. Pictures are BGR, as OpenCV's. See docs/python.m
 """
 
 import os as _os
+import resource as _resource
 import warnings as _warnings
 
 from ._errors import Error
+
+
+def _require_address_space():
+    # The module and NumPy map 380 MB; with less, OpenBLAS waits for ever for a buffer, at the latest when Python ends.
+    least = 500_000_000
+    limit, _ = _resource.getrlimit(_resource.RLIMIT_AS)
+    if limit != _resource.RLIM_INFINITY and limit < least:
+        raise Error("to import touchstone takes 500 MB of address space; the limit of it (ulimit -v) is lower")
+
+
+_require_address_space()
 from . import _core
 from ._core import (
     BeadTracker,

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/named_file.h"
+
 namespace touchstone::sim {
 namespace {
 
@@ -11,9 +13,7 @@ void read_named_file(YamlReader& in, const std::string& key, T& value) {
   std::string name;
   in.required(key, name);
   if (in.describing()) return;
-  const std::filesystem::path file = in.folder() / name;
-  if (!std::filesystem::is_regular_file(file)) fail_at(in.where(key), "{}: there is no file {}", key, file.string());
-  value = read_yaml<T>(file);
+  value = read_yaml<T>(named_file(in, key, name));
 }
 
 }  // namespace

@@ -175,6 +175,19 @@ class Memory(Attack):
         for megabytes in (920, 1020):  # what is mapped at first differs by a buffer of 131 MB
             self.expect_refused(self.render(megabytes), "tetrahedra needs about 772 MB", "are left by the address space")
 
+    def test_python_is_refused_before_it_waits_for_ever(self):
+        module = pathlib.Path(PROGRAM).parent.parent / "python"
+        if not (module / "touchstone").is_dir():
+            self.skipTest("this build has no Python module")
+
+        def limit():
+            resource.setrlimit(resource.RLIMIT_AS, (340 * 10**6, 340 * 10**6))
+
+        run = subprocess.run(["/usr/bin/python3", "-c", "import touchstone"], env={"PYTHONPATH": str(module)}, preexec_fn=limit,
+                             timeout=PATIENCE_S, stderr=subprocess.PIPE, encoding="utf-8")
+        self.assertEqual(run.returncode, 1, run.stderr)
+        self.assertIn("500 MB of address space", run.stderr)
+
     def test_a_job_of_too_many_files_is_refused(self):
         job = self.scenes / "draw.yaml"
         text = job.read_text().replace("../../scenes", str(SOURCE / "scenes"))
@@ -200,7 +213,7 @@ class Refusals(Attack):
         for name in ("beads-device.yaml", "probe.yaml", "beads-motion.yaml", "beads-scene.yaml"):
             (self.scenes / name).unlink()
             os.mkfifo(self.scenes / name)
-            self.expect_refused(self.plan(), name)
+            self.expect_refused(self.plan(), name, "is a pipe or a device; only files are read")
             (self.scenes / name).unlink()
             shutil.copy(SOURCE / "tests/jobs" / name, self.scenes)
         os.mkfifo(self.scenes / "body.stl")

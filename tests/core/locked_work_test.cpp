@@ -105,6 +105,9 @@ TEST(LockedWork, LoopsUnderOneLockInALoopComeToTheirEnd) {
 }
 
 TEST(LockedWork, WhatTheWorkThrowsComesOutAndLeavesTheLockFree) {
+#ifdef __SANITIZE_THREAD__
+  GTEST_SKIP() << "ThreadSanitizer's pthread_once waits for ever after an exception (gcc 12)";
+#endif
   std::mutex mutex;
   EXPECT_THROW(locked_work(mutex, [] { fail("broke"); }), Error);
   EXPECT_EQ(locked_work(mutex, [] { return 7; }), 7);

@@ -1,12 +1,19 @@
-// Writes the seeds of the targets `models`, `events` and `event_hdf5` by the project's own writers: `fuzz_make_seeds
-// tests/fuzz/corpus`, after a format has changed. As small as they can be, since that is how they're mutated best.
+// Writes the seeds of the targets `models`, `events`, `event_hdf5`, `set_up_results`, `blocks` and `pictures` by the
+// project's own writers: `fuzz_make_seeds tests/fuzz/corpus`, after a format has changed. As small as they can be,
+// since that is how they're mutated best.
 
 #include <cstdio>
 #include <filesystem>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
 #include <vector>
 
+#include "core/matrix_file.h"
 #include "core/random.h"
 #include "core/whole_file.h"
+#include "datasets/sets/block_file.h"
+#include "datasets/sets/truth_file.h"
+#include "fem/elements/compliance_file.h"
 #include "sensors/beads/stiffness_model_file.h"
 #include "sensors/colour/hue_model_file.h"
 #include "sensors/events/event_file.h"
@@ -21,6 +28,9 @@
 #include "sensors/texture/texture_model_file.h"
 #include "sensors/touch_map/tactile_map_file.h"
 #include "sensors/tractions/marker_compliance_file.h"
+#include "sim/files/image_file.h"
+#include "sim/press/press_path_file.h"
+#include "sim/sensor/light_file.h"
 
 namespace touchstone::fuzz {
 namespace {
@@ -198,7 +208,144 @@ std::vector<Event> events() {
   return made;
 }
 
+const std::string kKey(64, 'a');
+
+/// A gel of one triangle and one bead.
+fem::Compliance gel() {
+  fem::Compliance made;
+  made.thickness = 4.0;
+  made.vertices = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}};
+  made.triangles = {{0, 1, 2}};
+  made.mass.resize(3, 3);
+  made.mass.setIdentity();
+  made.surface = Eigen::MatrixXd(Eigen::MatrixXd::Identity(9, 9));
+  made.beads = fem::SharedMatrix(Eigen::MatrixXd(Eigen::MatrixXd::Constant(3, 9, 0.25)));
+  made.mesh_error.smooth.radius_per_edge = {2.0};
+  made.mesh_error.smooth.errors.resize(1);
+  return made;
+}
+
+/// The same with its far parts compressed: two clusters of one and two vertices, and what joins them.
+fem::Compliance compressed_gel() {
+  fem::FarFieldMatrix::Parts parts;
+  parts.order = {1, 0, 2};
+  parts.clusters = {{2, {-1, -1}, 0, 1, 1, 0}, {2, {-1, -1}, 1, 3, 1, 3}, {-1, {0, 1}, 0, 3, 0, 9}};
+  parts.blocks = {{0, 0, false, 9}, {1, 1, false, 18}, {1, 0, true, 54}};
+  parts.numbers = fem::SharedMatrix(Eigen::MatrixXd(Eigen::MatrixXd::Constant(55, 1, 0.5)));
+  fem::Compliance made = gel();
+  made.surface = fem::FarFieldMatrix(std::move(parts));
+  return made;
+}
+
+/// Two beams in a grid of eight nodes.
+sim::FoundLight light() {
+  sim::FoundLight made;
+  made.choice.direct = true;
+  made.choice.reason = "small";
+  render::LightField& field = made.field;
+  field.reach = Eigen::AlignedBox3d(Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(1, 1, 1));
+  field.nodes.setConstant(2);
+  field.step.setConstant(1.0);
+  field.lamp_of = {0, 0};
+  field.intensity.assign(2, render::Spectrum::Constant(1, 0.5));
+  field.beside.resize(2);
+  field.beside[0].steeper = 1;
+  field.beside[1].flatter = 0;
+  field.flow.assign(2 * 4 * 8, 0.25F);
+  made.bounced = cv::Mat(1, 2, CV_32FC1, cv::Scalar(0.5));
+  return made;
+}
+
+/// Of the gel above, with its first vertex in contact.
+fem::PressState press() {
+  fem::PressState state;
+  state.wrench << 0.0, 0.0, 1.0, 0.0, 0.0, 0.0;
+  state.traction = Eigen::MatrixX3d::Constant(3, 3, 0.25);
+  state.surface_displacement = Eigen::MatrixX3d::Constant(3, 3, -0.5);
+  state.bead_displacement = Eigen::MatrixX3d::Constant(1, 3, -0.25);
+  state.node_state = {fem::NodeState::stick, fem::NodeState::open, fem::NodeState::open};
+  state.node_owner = {0, -1, -1};
+  state.bodies = {{state.gel_from_object, state.wrench, 0.5, 1}};
+  return state;
+}
+
+void write_set_up_results(const std::filesystem::path& corpus) {
+  fem::write_compliance(corpus / "whole.compliance", kKey, gel());
+  fem::write_compliance(corpus / "compressed.compliance", kKey, compressed_gel());
+  sim::write_light(corpus, kKey, light());
+  std::filesystem::rename(sim::light_file(corpus, kKey), corpus / "light.bin");
+  sim::write_press_path(corpus / "press-path.bin", kKey, {.at = {0.0}, .states = {press()}, .stopped = "", .note = ""});
+  // As fem/vibration/vibration_cache.cpp writes them: frequency, surface, beads, effective mass, mass.
+  write_whole_file(corpus / "vibration.bin",
+                   matrix_file("TSVIBRAT", kKey,
+                               {Eigen::MatrixXd::Constant(1, 1, 100.0), Eigen::MatrixXd::Constant(9, 1, 0.5),
+                                Eigen::MatrixXd::Constant(3, 1, 0.5), Eigen::MatrixXd::Constant(3, 1, 0.25),
+                                Eigen::MatrixXd::Constant(1, 1, 1.0)}));
+}
+
+void write_truth(const std::filesystem::path& file) {
+  const datasets::TruthHeader header{.job_name = "job",
+                                     .version = "0",
+                                     .samples = 2,
+                                     .objects = 1,
+                                     .scenes = {"scene"},
+                                     .bead_rest = {{0.0, 0.0, -1.0}}};
+  datasets::TruthFileWriter writer(file, header, gel());
+  for (int frame = 0; frame < 2; ++frame) {
+    sim::Truth truth;
+    truth.frame = frame;
+    truth.t_us = 1000 * frame;
+    truth.press = press();
+    writer.append(0, datasets::Split::train, truth);
+  }
+  writer.close();
+}
+
+/// Two samples with pictures of 3 x 2.
+void write_block(const std::filesystem::path& file) {
+  datasets::PreparedDraw prepared;
+  prepared.job.name = "job";
+  prepared.job.outputs = {};
+  prepared.job.outputs.frame = prepared.job.outputs.height = prepared.job.outputs.contact = true;
+  datasets::UnitSensor sensor;
+  sensor.light = "direct";
+  sensor.background = cv::Mat(2, 3, CV_8UC1, cv::Scalar(100));
+  std::vector<datasets::BlockRecord> records(2);
+  for (datasets::BlockRecord& record : records) {
+    record.frame = sensor.background;
+    record.height = cv::Mat(2, 3, CV_32FC1, cv::Scalar(0.5));
+    record.contact = cv::Mat(2, 3, CV_8UC1, cv::Scalar(255));
+  }
+  const datasets::DrawnBlock block{.number = 0, .unit = 0, .first_sample = 0, .samples = 2};
+  const std::filesystem::path out = file.parent_path();
+  std::filesystem::create_directories((out / datasets::block_name(block)).parent_path());
+  datasets::DrawnUnit unit;
+  unit.text = "name: unit\n";
+  datasets::write_block(out, "run", prepared, block, unit, sensor, records);
+  std::filesystem::rename(out / datasets::block_name(block), file);
+  std::filesystem::remove((out / datasets::block_name(block)).parent_path());
+}
+
+void write_pictures(const std::filesystem::path& corpus) {
+  const cv::Mat grey = (cv::Mat_<std::uint8_t>(2, 3) << 0, 50, 100, 150, 200, 255);
+  cv::Mat coloured;
+  cv::merge(std::vector<cv::Mat>{grey, grey, grey}, coloured);
+  cv::Mat floats;
+  coloured.convertTo(floats, CV_32F);
+  sim::write_png(corpus / "grey.png", grey);
+  sim::write_png(corpus / "coloured.png", coloured, {{"touchstone", "a"}});
+  sim::write_exr(corpus / "floats.exr", floats, {"B", "G", "R"});
+  for (const char* ending : {".jpg", ".tif", ".bmp"}) {
+    std::vector<std::uint8_t> bytes;
+    cv::imencode(ending, coloured, bytes);
+    write_whole_file(corpus / (std::string("coloured") + ending), std::string(bytes.begin(), bytes.end()));
+  }
+}
+
 void write_seeds(const std::filesystem::path& corpus) {
+  for (const char* folder : {"models", "events", "event_hdf5", "set_up_results", "blocks", "pictures"}) {
+    std::filesystem::create_directories(corpus / folder);
+  }
   const std::filesystem::path models = corpus / "models";
   save(explore(), models / "explore.json");
   save(reflex(), models / "reflex.json");
@@ -221,6 +368,10 @@ void write_seeds(const std::filesystem::path& corpus) {
     writer.append(events());
     writer.close();
   }
+  write_set_up_results(corpus / "set_up_results");
+  write_truth(corpus / "blocks/truth.h5");
+  write_block(corpus / "blocks/block.h5");
+  write_pictures(corpus / "pictures");
 }
 
 }  // namespace

@@ -144,7 +144,8 @@ TEST_F(ApparentChangeStudy, MistakesAreRefusedWithTheirPlace) {
   };
   refused("apparent_change", "apparent_chnge", "s.yaml:2: kind: 'apparent_chnge'");
   refused("name: s\n", "name: a/b\n", "'a/b' can't name files");
-  refused("d.yaml", "none.yaml", "none.yaml");
+  refused("d.yaml", "none.yaml", "s.yaml:3: device: there is no file");
+  refused("[punch.yaml]", "[none.yaml]", "s.yaml:6: objects: there is no file");
   refused("gel.thickness_mm", "gel.thicknes_mm", "did you mean 'gel.thickness_mm'");
   refused("[1.5, 2, 3]", "[]", "vary.values: is empty");
   refused("[1.5, 2, 3]", "[1.5, 1.5]", "must rise");
