@@ -62,10 +62,11 @@ struct PressTolerance {
   double largest_motion =
       std::numeric_limits<double>::infinity();  ///< mm: steps with friction are cut into equal parts
                                                 ///< whose translations are no longer than this
-  /// Of a step with friction in which a body first touches, with fewer parts than this: so many, each of which ends
-  /// twice as far as the one before. The displacement along the surface needs them, the force hardly does: in one part
-  /// of a sphere's press it is off by 0.17 to 0.31 (root of the mean square, of its own; 0.2 to 3 N), the depth by 0.06
-  /// %; in two by 0.08 to 0.20 and 0.03 %, in four by 0.04 to 0.11 and 0.02 %.
+  /// Of a step with friction in which a body that is led by force first touches, with fewer parts than this: so many,
+  /// each of which ends twice as far as the one before. What sticks keeps the place along the body that it had when it
+  /// was touched, so the displacement along the surface needs parts, the force hardly does: in one part of a sphere's
+  /// press it was off by 0.37 to 0.60 (root of the mean square, of its own), the depth by 0.1 %; in four by 0.16 to
+  /// 0.27 and 0.04 %.
   int touch_parts = 1;
   int most_halvings = 7;          ///< of a step that doesn't converge
   bool outlines = true;           ///< hats are cut by what bodies cover (see cut_hats.h); false: they are

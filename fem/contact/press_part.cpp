@@ -474,7 +474,6 @@ std::optional<PressSnapshot> PartSolver::solve(const PressSnapshot& from, const 
       const int v = vertices[j];
       start.segment(c * j, c) = block_.axes(v).leftCols(c).transpose() * now.traction.segment<3>(3 * v);
     }
-    if (c == 3) keep_places_at_touch(contact, from, now, start, effort);
     ContactAnswer answer =
         c == 1 ? solve_frictionless(contact, start, memory_) : solve_frictional(contact, start, traction_, memory_);
     effort.solves += answer.iterations;

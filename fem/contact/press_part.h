@@ -123,8 +123,6 @@ class PartSolver {
   std::vector<int> candidates(const Iterate& now, bool z_forced) const;
   ContactProblem problem(const PressSnapshot& from, const std::vector<PartTarget>& targets, const Iterate& now);
   Eigen::VectorXd drag(const PressSnapshot& from, const Iterate& now) const;
-  void keep_places_at_touch(ContactProblem& contact, const PressSnapshot& from, const Iterate& now,
-                            const Eigen::VectorXd& start, PartEffort& effort);
   void begin(const PressSnapshot& from, const std::vector<PartTarget>& targets, Iterate& now) const;
   bool take_shift(const ContactAnswer& answer, const std::vector<PartTarget>& targets, Iterate& now);
   void follow_patches(const ContactAnswer& answer, Iterate& now) const;

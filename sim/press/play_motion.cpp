@@ -18,7 +18,7 @@ namespace touchstone::sim {
 namespace {
 
 constexpr double kStepsAPeriod = 12.0;
-constexpr int kTouchParts = 2;  // where it is seen how the gel moves along itself
+constexpr int kTouchParts = 4;  // where it is seen how the gel moves along itself
 
 /// Whether pictures show how the surface moves along itself: a plain coating looks alike wherever it goes.
 bool shows_shear(const DeviceSpec& device) {
