@@ -18,16 +18,11 @@ namespace touchstone::sim {
 namespace {
 
 constexpr double kStepsAPeriod = 12.0;
-constexpr int kTouchParts = 4;  // where it is seen how the gel moves along itself
+constexpr int kTouchParts = 4;
 
-/// Whether pictures show how the surface moves along itself: a plain coating looks alike wherever it goes.
-bool shows_shear(const DeviceSpec& device) {
-  return !device.coating || device.coating->print || device.beads || device.pins;
-}
-
-fem::PressTolerance tolerance_for(const DeviceSpec& device) {
+fem::PressTolerance press_tolerance() {
   fem::PressTolerance tolerance;
-  if (shows_shear(device)) tolerance.touch_parts = kTouchParts;
+  tolerance.touch_parts = kTouchParts;
   return tolerance;
 }
 
@@ -42,7 +37,7 @@ class PlannedPress {
       TS_ASSERT(finite_gel_->rest.vertices == gel.vertices);
       finite_.emplace(*finite_gel_, bodies.front().shape, bodies.front().friction, fem::PressTolerance{}, relaxation);
     } else {
-      linear_.emplace(gel, std::move(bodies), tolerance_for(scene.device), relaxation);
+      linear_.emplace(gel, std::move(bodies), press_tolerance(), relaxation);
     }
   }
 
