@@ -27,7 +27,7 @@ struct Path {
   PressSnapshot start;
   std::vector<PartTarget> to;
   double seconds = 0.0;
-  bool first_touch = false;  ///< with friction
+  bool first_touch = false;  ///< by force, with friction
 };
 
 struct Effort {
@@ -269,7 +269,7 @@ double Press::Parts::add_segment(std::size_t b, const PressTarget& target, Path&
     }
     start.pose = touch.value_or(to.pose);
     if (!touch) clear = 1.0;
-    path.first_touch = path.first_touch || (meets && friction(b) > 0.0);
+    path.first_touch = path.first_touch || (meets && friction(b) > 0.0 && to.forced[2]);
   }
   if (!here.touching || no_force) path.start.forget(static_cast<int>(b));
   if (!meets)
