@@ -127,7 +127,8 @@ TEST_F(SeveralObjects, OfOtherLengthsOrRatesAreRefused) {
   EXPECT_THAT(error_of(one_more(2.0, "long.yaml")),
               HasSubstr("scene.yaml:7: more_objects: the motion has 6 frames, that of the first object 3"));
   EXPECT_THAT(error_of(one_more(2.0, "fast.yaml")), HasSubstr("scene.yaml:7: more_objects: the motion has 50 frames"));
-  EXPECT_THAT(error_of(one_more(2.0, "nowhere.yaml")), HasSubstr("scene.yaml:7: motion: there is no file"));
+  EXPECT_THAT(error_of(one_more(2.0, "nowhere.yaml")),
+              HasSubstr("scene.yaml:7: more_objects[0]: motion: there is no file"));
   EXPECT_THAT(error_of("more_objects:\n  - {object: ball.yaml}\n"), HasSubstr("scene.yaml:7"));
   EXPECT_EQ(error_of(one_more(2.0, "press.yaml")), "");
 }
