@@ -50,8 +50,7 @@ TS_WIDE_CLONES void see(const Seeing& cell, const double* __restrict x, const do
   }
 }
 
-/// What HalfSpaceResponse::between is made of, over its scale: of a normal traction by a normal one, along either
-/// tangent by a normal one, and what tangential ones have beyond the first. `axes`: the tangents, one after the other.
+/// ResponseTerms, one row after the other. `axes`: the tangents, one after the other.
 TS_WIDE_CLONES void see_terms(double nu, const double* axes, const double* __restrict dx, const double* __restrict dy,
                               const double* __restrict dz, const double* __restrict inverse, int count,
                               double* __restrict terms) {
@@ -64,17 +63,13 @@ TS_WIDE_CLONES void see_terms(double nu, const double* axes, const double* __res
   for (int j = 0; j < count; ++j) {
     const double x = axes[0] * dx[j] + axes[1] * dy[j] + axes[2] * dz[j];
     const double y = axes[3] * dx[j] + axes[4] * dy[j] + axes[5] * dz[j];
-    const double flat2 = x * x + y * y;
-    const double over_flat2 = 1.0 / (flat2 > 1e-100 ? flat2 : 1e-100);
-    const double square = flat2 * (inverse[j] * inverse[j]);
-    const double shear = (0.5 - nu) * (square < 1.0 ? square : 1.0) * over_flat2;
-    const double along = nu * inverse[j] * over_flat2;
-    normal[j] = (1.0 - nu) * inverse[j];
-    first[j] = shear * x;
-    second[j] = shear * y;
-    first_first[j] = along * (x * x);
-    first_second[j] = along * x * y;
-    second_second[j] = along * (y * y);
+    const ResponseTerms at(nu, x, y, inverse[j]);
+    normal[j] = at.normal;
+    first[j] = at.first;
+    second[j] = at.second;
+    first_first[j] = at.first_first;
+    first_second[j] = at.first_second;
+    second_second[j] = at.second_second;
   }
 }
 
@@ -298,22 +293,18 @@ class DensityPairs {
 
   /// Into the lower half. `all`: of vertices of one triangle, whose pairs are added in both orders.
   void add_block(Eigen::MatrixXd& out, int row, int column, const Matrix3d& block, bool all) const {
-    if (normal_only_) {
-      if (row == column && !all) {
-        out(row, column) += 2.0 * block(0, 0);
-      } else if (row >= column) {
-        out(row, column) += block(0, 0);
-      } else if (!all) {
-        out(column, row) += block(0, 0);
-      }
-      return;
-    }
+    normal_only_ ? add_part<1>(out, row, column, block, all) : add_part<3>(out, row, column, block, all);
+  }
+  template <int Each>
+  static void add_part(Eigen::MatrixXd& out, int row, int column, const Matrix3d& block, bool all) {
+    const auto part = block.topLeftCorner<Each, Each>();
+    const auto at = [&](int to_row, int to_column) { return out.block<Each, Each>(Each * to_row, Each * to_column); };
     if (row == column && !all) {
-      out.block<3, 3>(3 * row, 3 * column) += block + block.transpose();
+      at(row, column) += part + part.transpose();
     } else if (row >= column) {
-      out.block<3, 3>(3 * row, 3 * column) += block;
+      at(row, column) += part;
     } else if (!all) {
-      out.block<3, 3>(3 * column, 3 * row) += block.transpose();
+      at(column, row) += part.transpose();
     }
   }
 

@@ -78,18 +78,13 @@ TS_WIDE_CLONES void add_terms(double nu, const double* __restrict place, double 
   for (int j = 0; j < count; ++j) {
     const double x = place[j] + first * place[3 * count + j];
     const double y = place[count + j] + first * place[4 * count + j] + other * place[5 * count + j];
-    const double flat2 = x * x + y * y;
-    const double over_flat2 = weight[j] / (flat2 > 1e-100 ? flat2 : 1e-100);
-    const double inverse = 1.0 / r[j];
-    const double square = flat2 * (inverse * inverse);
-    const double shear = (0.5 - nu) * (square < 1.0 ? square : 1.0) * over_flat2;
-    const double along = nu * inverse * over_flat2;
-    terms[j] += weight[j] * (1.0 - nu) * inverse;
-    terms[count + j] += shear * x;
-    terms[2 * count + j] += shear * y;
-    terms[3 * count + j] += along * (x * x);
-    terms[4 * count + j] += along * x * y;
-    terms[5 * count + j] += along * (y * y);
+    const ResponseTerms at(nu, x, y, 1.0 / r[j]);
+    terms[j] += weight[j] * at.normal;
+    terms[count + j] += weight[j] * at.first;
+    terms[2 * count + j] += weight[j] * at.second;
+    terms[3 * count + j] += weight[j] * at.first_first;
+    terms[4 * count + j] += weight[j] * at.first_second;
+    terms[5 * count + j] += weight[j] * at.second_second;
   }
 }
 

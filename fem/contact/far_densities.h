@@ -25,7 +25,7 @@ struct DensityMoments {
 /// Responses of a half-space between one density and others.
 class FarDensities {
  public:
-  /// Rows of an answer: pressure alone, or what HalfSpaceResponse::between is made of.
+  /// Rows of an answer if not of pressure alone: those of ResponseTerms.
   static constexpr int kTerms = 6;
 
   /// Keeps the reference.

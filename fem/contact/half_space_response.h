@@ -10,6 +10,27 @@
 
 namespace touchstone::fem {
 
+/// What the response at (x, y) mm along the tangents is made of, over its scale, with the mean `inverse` of 1/r: of a
+/// normal traction by a normal one, along either tangent by a normal one, and what tangential ones have beyond the
+/// first. Plain arithmetic, for loops over many points.
+struct ResponseTerms {
+  ResponseTerms(double nu, double x, double y, double inverse) {
+    const double flat2 = x * x + y * y;
+    const double over_flat2 = 1.0 / (flat2 > 1e-100 ? flat2 : 1e-100);
+    const double square = flat2 * (inverse * inverse);
+    const double shear = (0.5 - nu) * (square < 1.0 ? square : 1.0) * over_flat2;
+    const double along = nu * inverse * over_flat2;
+    normal = (1.0 - nu) * inverse;
+    first = shear * x;
+    second = shear * y;
+    first_first = along * (x * x);
+    first_second = along * x * y;
+    second_second = along * (y * y);
+  }
+
+  double normal, first, second, first_first, first_second, second_second;
+};
+
 /// In the axes (into the body, first, second tangent). On a gel that is thin beside its edges the response fades as
 /// exp(-r / 0.4 thickness): a load acts about as far on a bonded layer, for the transform of exp(-r / l) / r,
 /// 1 / sqrt(k^2 + 1 / l^2), goes as the layer's kernel over k. It stays positive definite, being the product of two

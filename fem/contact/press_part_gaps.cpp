@@ -73,9 +73,11 @@ WeightedGap PartSolver::gap_of(std::size_t b, const Iterate& now, PartEffort& ef
   const ContactShape& shape = bodies_[b].shape;
   // Some more than what is asked for, so that it serves the next, deeper place, too.
   const GapReach reach = surface_.flat ? GapReach{now.reach + kLeastReach * gel_.thickness, 1.5 * kBulge} : GapReach{};
+  const auto keeps_cuts = [&] {
+    return cached.gap.cuts && cuts_hold(cached, body, now.updates < kCutUpdates ? kCutsHold : kCutsHoldLate);
+  };
   const auto evaluate = [&] {
-    const double hold = now.updates < kCutUpdates ? kCutsHold : kCutsHoldLate;
-    const bool kept = cached.gap.cuts && cuts_hold(cached, body, hold);
+    const bool kept = keeps_cuts();
     std::vector<std::array<double, 2>> bent = std::move(cached.gap.bent);
     const double away = surface_.normals.front().dot(body.pose.translation - cached.pose.translation);
     cached.gap =
@@ -98,10 +100,7 @@ WeightedGap PartSolver::gap_of(std::size_t b, const Iterate& now, PartEffort& ef
   };
   if (!cached.valid || cached.pose.rotation != body.pose.rotation) return evaluate();
   const Eigen::Vector3d motion = body.pose.translation - cached.pose.translation;
-  if (motion.z() != 0.0 && cached.gap.overlap_cuts_after(motion.z())) {
-    const double hold = now.updates < kCutUpdates ? kCutsHold : kCutsHoldLate;
-    if (!cached.gap.cuts || !cuts_hold(cached, body, hold)) return evaluate();
-  }
+  if (motion.z() != 0.0 && cached.gap.overlap_cuts_after(motion.z()) && !keeps_cuts()) return evaluate();
   const auto n = static_cast<Eigen::Index>(gel_.vertices.size());
   Eigen::MatrixX2d slid = Eigen::MatrixX2d::Zero(n, 2);  // of the gel under the body
   for (Eigen::Index v = 0; v < n; ++v) {
