@@ -31,6 +31,7 @@
 #include "sim/files/image_file.h"
 #include "sim/press/press_path_file.h"
 #include "sim/sensor/light_file.h"
+#include "tests/support/small_light.h"
 
 namespace touchstone::fuzz {
 namespace {
@@ -237,21 +238,10 @@ fem::Compliance compressed_gel() {
   return made;
 }
 
-/// Two beams in a grid of eight nodes.
+/// With a picture of bounced light.
 sim::FoundLight light() {
-  sim::FoundLight made;
-  made.choice.direct = true;
+  sim::FoundLight made = test::small_light(1);
   made.choice.reason = "small";
-  render::LightField& field = made.field;
-  field.reach = Eigen::AlignedBox3d(Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(1, 1, 1));
-  field.nodes.setConstant(2);
-  field.step.setConstant(1.0);
-  field.lamp_of = {0, 0};
-  field.intensity.assign(2, render::Spectrum::Constant(1, 0.5));
-  field.beside.resize(2);
-  field.beside[0].steeper = 1;
-  field.beside[1].flatter = 0;
-  field.flow.assign(2 * 4 * 8, 0.25F);
   made.bounced = cv::Mat(1, 2, CV_32FC1, cv::Scalar(0.5));
   return made;
 }

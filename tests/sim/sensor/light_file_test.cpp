@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 
+#include "tests/support/small_light.h"
 #include "tests/support/temporary_folder.h"
 
 namespace touchstone::sim {
@@ -12,23 +13,7 @@ namespace {
 
 const std::string kKey(64, 'a');
 
-/// Two beams in a grid of eight nodes.
-FoundLight small_light() {
-  FoundLight light;
-  light.choice.direct = true;
-  light.choice.reason = "as it's wanted";
-  render::LightField& field = light.field;
-  field.reach = Eigen::AlignedBox3d(Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(1, 1, 1));
-  field.nodes.setConstant(2);
-  field.step.setConstant(1.0);
-  field.lamp_of = {0, 0};
-  field.intensity.assign(2, render::Spectrum::Constant(3, 0.5));
-  field.beside.resize(2);
-  field.beside[0].steeper = 1;
-  field.beside[1].flatter = 0;
-  field.flow.assign(2 * 4 * 8, 0.25f);
-  return light;
-}
+using test::small_light;
 
 TEST(LightFile, WhatIsReadIsWhatWasWritten) {
   const touchstone::test::TemporaryFolder folder;
