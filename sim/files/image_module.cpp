@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "sim/files/image_damage.h"
+
 namespace {
 
 constexpr int kLongestSide = 1 << 16;
@@ -80,6 +82,7 @@ int read(const char* path, const char* key, void* (*accept)(void*, const Touchst
          char* message, std::size_t size) {
   OIIO::ImageSpec wishes;
   wishes.attribute("oiio:UnassociatedAlpha", 1);  // colours as they're stored, not multiplied by alpha
+  if (const std::string damage = touchstone::image_damage(path); !damage.empty()) return failed(damage, message, size);
   const auto input = OIIO::ImageInput::open(path, &wishes);
   if (!input) return failed(OIIO::geterror(), message, size);
   const OIIO::ImageSpec& spec = input->spec();

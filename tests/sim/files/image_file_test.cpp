@@ -187,6 +187,52 @@ TEST_F(ImageFile, DamagedFilesAreRefusedByName) {
   EXPECT_THROW(read_exr(folder_ / "a.png"), Error);
 }
 
+TEST_F(ImageFile, NoDamagedBitOfAPngMakesALibraryPrint) {
+  write_png(folder_ / "a.png", pattern(CV_8UC3, 5, 4), {{"touchstone", "kept"}});
+  const std::string whole = read_whole_file(folder_ / "a.png");
+  constexpr std::size_t kHeadEnd = 33;  // the signature and IHDR
+  const std::size_t pixels = whole.find("IDAT");
+  const std::size_t end = whole.find("IEND") - 4;
+  testing::internal::CaptureStderr();
+  for (std::size_t bit = 0; bit < 8 * end; ++bit) {
+    std::string damaged = whole;
+    damaged[bit / 8] = static_cast<char>(damaged[bit / 8] ^ (1 << bit % 8));
+    write_whole_file(folder_ / "damaged.png", damaged);
+    const bool needed = bit / 8 < kHeadEnd || bit / 8 >= pixels - 4;  // between them stand notes
+    EXPECT_TRUE(!complaint(folder_ / "damaged.png").empty() || !needed) << "bit " << bit % 8 << " of byte " << bit / 8;
+  }
+  for (std::size_t length = 0; length < end; ++length) {
+    write_whole_file(folder_ / "short.png", whole.substr(0, length));
+    EXPECT_NE(complaint(folder_ / "short.png"), "") << length << " bytes of " << whole.size();
+  }
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+
+  std::string damaged = whole;
+  damaged[pixels + 10] = static_cast<char>(damaged[pixels + 10] ^ 1);
+  write_whole_file(folder_ / "damaged.png", damaged);
+  EXPECT_THAT(complaint(folder_ / "damaged.png"), HasSubstr("its chunk IDAT isn't what its checksum says"));
+}
+
+TEST_F(ImageFile, ANoteLongerThanItsExrIsRefusedBeforeMemoryIsAskedFor) {
+  write_exr(folder_ / "a.exr", cv::Mat(2, 2, CV_32FC1, cv::Scalar(1)), {"Y"}, {{"touchstone", "kept"}});
+  std::string bytes = read_whole_file(folder_ / "a.exr");
+  const std::string note("touchstone\0string\0", 18);
+  const std::size_t length = bytes.find(note) + note.size();
+  ASSERT_LT(length, bytes.size());
+  ASSERT_EQ(bytes[length], 4);
+  const auto fault = [&](const std::string& said) {
+    std::string damaged = bytes;
+    damaged.replace(length, 4, said);
+    write_whole_file(folder_ / "b.exr", damaged);
+    return complaint(folder_ / "b.exr");
+  };
+  EXPECT_THAT(fault("\xff\xff\xff\x7f"), HasSubstr("a note of its header is longer than the file"));
+  const std::size_t left = bytes.size() - length - 4;
+  const std::string just{static_cast<char>((left + 1) & 0xff), static_cast<char>((left + 1) >> 8), 0, 0};
+  EXPECT_THAT(fault(just), HasSubstr("a note of its header is longer than the file"));
+  EXPECT_EQ(read_exr(folder_ / "a.exr").image.rows, 2);
+}
+
 TEST_F(ImageFile, MorePixelsThanAreReadAreRefusedByName) {
   write_png(folder_ / "large.png", cv::Mat(10001, 10000, CV_8UC1, cv::Scalar(0)));
   EXPECT_THAT(complaint(folder_ / "large.png"),
