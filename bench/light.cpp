@@ -3,6 +3,7 @@
 //   script/bench light      or  build/dev/bench/bench_light -o build/bench-results [--quick] [--only effects]
 #include <algorithm>
 
+#include "bench/coated_sections.h"
 #include "bench/direct_sections.h"
 #include "bench/light_sections.h"
 #include "bench/report.h"
@@ -14,7 +15,7 @@ int main(int argc, char** argv) {
   const std::vector<std::pair<std::string, ResultTable (*)(const LightOptions&)>> tables = {
       {"rays", bare_rays_table},        {"error", light_error_table},        {"frames", direct_frames_table},
       {"blur", hole_blur_table},        {"gelsight", gelsight_frames_table}, {"growth", light_growth_table},
-      {"effects", light_effects_table}, {"devices", device_frames_table}};
+      {"effects", light_effects_table}, {"devices", device_frames_table},    {"coated", coated_error_table}};
   std::vector<std::string> names;
   for (const auto& [name, make] : tables) names.push_back(name);
   CLI::App app("The renderers' speed and error");

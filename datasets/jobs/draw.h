@@ -86,10 +86,10 @@ struct DrawJob {
   std::uint64_t seed = 0;
   std::int64_t samples = 0;
   int samples_per_file = 100;
-  double membrane_um = 40.0;                ///< sim::VirtualSensorSettings::membrane_um
-  double interreflection_tolerance = 0.05;  ///< sim::VirtualSensorSettings
-  int edge_side = 4;                        ///< sim::VirtualSensorSettings
-  render::GuideCut guides;                  ///< sim::VirtualSensorSettings
+  double membrane_um = 40.0;                 ///< sim::VirtualSensorSettings::membrane_um
+  double interreflection_tolerance = 0.005;  ///< sim::VirtualSensorSettings
+  int edge_side = 4;                         ///< sim::VirtualSensorSettings
+  render::GuideCut guides;                   ///< sim::VirtualSensorSettings
   DrawSpec draw;
   DrawnOutputs outputs;
   SplitSpec splits;

@@ -256,16 +256,25 @@ void DirectBatch::white_light(int lane, const float* ambient, float* out) const 
   }
 }
 
-void DirectBatch::reflect_from_matt(int lane, float* sum) const {
+float DirectBatch::irradiance(int lane, int band) const {
   const float* amount = amounts(lane);
-  for (int band = 0; band < bands_; ++band) {
-    const float* intensity = fixture_.intensity.data() + band * stride_;
-    Four lit = Four::Zero();
-    for (int group = 0; group < fixture_.groups; ++group) {
-      lit += four(amount + group * 4) * four(intensity + group * 4) * passing(lane, group, band);
-    }
-    sum[band] = lanes_[lane].colour[band] * kPerPi * lit.sum();
+  const float* intensity = fixture_.intensity.data() + band * stride_;
+  Four lit = Four::Zero();
+  for (int group = 0; group < fixture_.groups; ++group) {
+    lit += four(amount + group * 4) * four(intensity + group * 4) * passing(lane, group, band);
   }
+  return lit.sum();
+}
+
+void DirectBatch::sent_back(int lane, const float* ambient, float* out) const {
+  for (int band = 0; band < bands_; ++band) {
+    const float arriving = irradiance(lane, band) + (ambient == nullptr ? 0.0f : ambient[band]);
+    out[band] = lanes_[lane].material->colour[band] * arriving;
+  }
+}
+
+void DirectBatch::reflect_from_matt(int lane, float* sum) const {
+  for (int band = 0; band < bands_; ++band) sum[band] = lanes_[lane].colour[band] * kPerPi * irradiance(lane, band);
 }
 
 /// As from a matt surface, less what films keep where each lamp's ray crosses their plane. Lamps of one colour are

@@ -54,10 +54,6 @@ class DirectBatch {
   };
   /// Takes that for a lane, so that no shadow ray asks.
   void take_as_known(int lane, const Visibility& known);
-  /// Takes for a lane which share of each lamp's light what is in the tree lets through: between two such lists, of
-  /// 255, `part` of the way from the first to the second.
-  void take_shares(int lane, const std::uint8_t* one, const std::uint8_t* other, float part);
-
   /// Takes away what doesn't get through.
   void cast_shadows(DirectCounts& counts);
 
@@ -72,11 +68,6 @@ class DirectBatch {
     float u, v;
   };
   std::optional<SheetPlace> sheet_place(int lane) const;  ///< see above
-  /// Where a lane has met the first surface, mm, if lamps light it; null where it hasn't. As long as the lane's rays
-  /// are kept.
-  const float* lit_sheet_place(int lane) const {
-    return takes_light(lane) && lanes_[lane].object == 0 ? lanes_[lane].place : nullptr;
-  }
   /// The triangle of the first surface that a lane's ray met; -1 where it met something else, or nothing.
   int sheet_triangle(int lane) const {
     const Lane& one = lanes_[lane];
@@ -86,6 +77,10 @@ class DirectBatch {
   /// What a white sheet in the place of a lane's would show, as SheetPoints::values has it: 4 floats a band. `ambient`
   /// as in add(). @pre sheet_place(lane); no films
   void white_light(int lane, const float* ambient, float* out) const;
+
+  /// Irradiance that lamps give a lane's sheet times its albedo, that of its unprinted material: a number a band.
+  /// `ambient` as in add(). @pre sheet_place(lane); no films
+  void sent_back(int lane, const float* ambient, float* out) const;
 
   /// Adds a lane's light to `out`, a number a band: `through` (that of CameraRays) times basic radiance. `ambient`, if
   /// any, is an irradiance from everywhere, W/m^2 a band, that comes on top.
@@ -132,6 +127,7 @@ class DirectBatch {
   void reflect_through_films(int lane, float* sum) const;
   bool shadow_ray(int lane, int lamp, int slot);
   void trace_shadows(int lamp, const int* lanes, int count, DirectCounts& counts);
+  float irradiance(int lane, int band) const;
   void reflect_from_matt(int lane, float* sum) const;
   void reflect_from_metal(int lane, float* sum) const;
 

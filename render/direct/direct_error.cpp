@@ -137,6 +137,7 @@ DirectChoice choose_direct(const Scene& rest, const Scene& first, const Camera& 
         settings.field_accuracy > 0.0 ? settings.field_accuracy : std::clamp(0.5 * settings.tolerance, 1e-4, 1e-2);
     light.guides = settings.guides;
     light.lit_radius = settings.lit_radius;
+    light.walls = walls_round_sheet(rest, reach);
     field = make_light_field(direct, reach, light);
   } catch (const Error& error) {
     choice.reason = error.what();
@@ -151,7 +152,7 @@ DirectChoice choose_direct(const Scene& rest, const Scene& first, const Camera& 
   auto renderer = std::make_unique<DirectRenderer>(field, camera, direct, settings.direct);
   if (rest.interreflection) {
     choice.bounced = measure_rest_light(*renderer, rest, camera, settings.rest);
-    renderer->set_bounced_light(choice.bounced);
+    renderer->set_bounced_light(choice.bounced, rest);
   }
   const cv::Mat picture = renderer->render(first).irradiance;
   choice.error = measure_direct_error(picture, first, camera, settings.error);

@@ -44,7 +44,7 @@ struct DirectChoice {
   std::string reason;
   DirectError error;  ///< of `first`, if it was drawn
   /// What the renderer was made of, for further ones that draw the same pictures: with the camera and `rest` without
-  /// interreflection, and set_bounced_light.
+  /// interreflection, and set_bounced_light with `rest`.
   LightField field;
   cv::Mat bounced;
 };

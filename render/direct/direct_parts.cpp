@@ -47,8 +47,6 @@ DirectRenderer::Parts::Parts(const LightField& field, const Camera& camera_of, c
   }
   set_up_films(rest);
   rays = trace_to_layer(field.fixture, camera, grid, field.layer, settings.samples, settings.seed);
-  if (lone_sheet && settings.shadows && !is_sheet_alone(fixture.bearings, rest))
-    still.emplace(find_still_shadows(rest));
   if (!spreads) return;
   radiance.resize(static_cast<std::size_t>(grid.columns) * grid.rows * rays.bands);
   refines = footprint.narrowest < kSharp && settings.edge_side > 1;
@@ -183,6 +181,16 @@ void DirectRenderer::Parts::keep_by_pixel(const CameraRays& pixels, const std::v
       }
     }
   }
+}
+
+Scene DirectRenderer::Parts::still_things(const Scene& rest) {
+  Scene still;
+  still.environment = rest.environment;
+  still.surfaces.reserve(rest.surfaces.size());
+  still.surfaces.push_back({{}, rest.surfaces[0].material});
+  still.surfaces.insert(still.surfaces.end(), rest.surfaces.begin() + 1, rest.surfaces.end());
+  still.balls = rest.balls;
+  return still;
 }
 
 bool DirectRenderer::Parts::stands_still(const Scene& scene) const {

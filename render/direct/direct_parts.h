@@ -21,17 +21,6 @@
 #include "render/scene/packet_scene.h"
 
 namespace touchstone::render {
-/// The light that still things keep from a sheet which moves before them. What a pixel sees of it lies on the pixel's
-/// ray, so it's known from some heights of the sheet, whatever the sheet's shape.
-struct StillShadows {
-  ShadowReach reach;  ///< of the still things
-  /// One height of the sheet.
-  struct Level {
-    std::vector<float> z;              ///< by grid point, where its ray met the sheet, mm; infinite where it didn't
-    std::vector<std::uint8_t> shares;  ///< [grid point][lamp]: of 255, what gets through to there
-  };
-  std::vector<Level> levels;  ///< the sheet at rest, moved along z: from outside inwards
-};
 
 /// All that a renderer keeps from frame to frame.
 struct DirectRenderer::Parts {
@@ -45,10 +34,9 @@ struct DirectRenderer::Parts {
   std::vector<TriangleMesh> others;  // of a lone sheet: all but the first surface, at rest
   PacketScene tree;
   std::vector<Surface> films;
-  std::optional<StillShadows> still;  // where a lone sheet isn't alone in casting shadows
-  bool connected;                     // the first surface
-  bool spreads;                       // central rays, then the footprint
-  bool refines = false;               // more rays at edges
+  bool connected;        // the first surface
+  bool spreads;          // central rays, then the footprint
+  bool refines = false;  // more rays at edges
   CameraFootprint footprint;
   CameraRays rays;
   // By pixel and band, where central rays are spread; see CameraRays.
@@ -57,7 +45,9 @@ struct DirectRenderer::Parts {
   std::vector<DirectBatch::Visibility> seen;  // by grid point, where edges get more rays
   std::vector<std::int32_t> sheet_triangles;  // by grid point, the first surface's triangle or -1; memory for a frame
   std::vector<float> bounced;                 // [grid point][band], irradiance; empty for none
-  std::map<double, GgxAlbedo> conductors;     // by roughness
+  std::vector<float> rest_normals;  // [grid point][axis] of the sheet that `bounced` is of, 0 beside it; or empty
+  std::vector<float> rest_sends;    // [grid point][band], irradiance times albedo
+  std::map<double, GgxAlbedo> conductors;  // by roughness
 
   Parts(const LightField& field, const Camera& camera_of, const Scene& rest,
         const DirectSettings& settings_of);  ///< as DirectRenderer's
@@ -65,18 +55,16 @@ struct DirectRenderer::Parts {
   int width() const { return size_of_grid(pixel_grid(camera)).x(); }
   int height() const { return size_of_grid(pixel_grid(camera)).y(); }
   /// Does the first surface alone move, as far as a scene at rest says, and do horizons say where it casts shadows?
-  bool is_lone_sheet(const Scene& rest) const;
+  bool is_lone_sheet(const Scene& rest) const { return horizon_settings && is_sheet_alone(fixture.bearings, rest); }
   /// Does all but the first surface stand where it stood at rest?
   bool stands_still(const Scene& scene) const;
 
-  /// Are still things' shadows on the frame's sheet known? Then each lane takes them before it asks by rays.
-  bool knows_still(const DirectFrame& frame) const { return still && frame.horizons != nullptr; }
-  void take_still(DirectBatch& batch, int first_tile, int packets) const;  ///< all lanes of a batch
-  void take_still(DirectBatch& batch, int lane, std::size_t point) const;  ///< a lane that sees near a grid point
   /// Casts the rays and shades what they meet: into `radiance`, or into the picture where nothing is spread.
   void cast(const DirectFrame& frame, DirectImage& image);
   /// Casts more rays where `radiance` has edges.
   void refine(const DirectFrame& frame, DirectImage& image);
+  /// The bounced light at what a lane has met, null where there's none; kept in `memory`.
+  const float* bounced_at(const DirectBatch& batch, int lane, std::size_t point, float* memory) const;
   /// From `sheet_triangles` to pixels; nothing where grid points aren't pixels.
   std::vector<std::int32_t> triangles_by_pixel() const;
   /// From `radiance` to the picture.
@@ -104,9 +92,6 @@ struct DirectRenderer::Parts {
 
   /// The scene with nothing of its first surface.
   static Scene still_things(const Scene& rest);
-  StillShadows find_still_shadows(const Scene& rest);
-  StillShadows::Level find_still_level(const ShadowReach& reach, const Surface& sheet,
-                                       const std::vector<DirectMaterial>& materials) const;
 
   /// Of a coarse grid of pixels, with what lies beside the outermost by half its spacing and by the blur.
   Eigen::AlignedBox2d find_seen_box() const;

@@ -8,6 +8,7 @@
 #include <iterator>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -75,12 +76,12 @@ void DirectRenderer::Parts::cast(const DirectFrame& frame, DirectImage& image) {
           batch.choose_lens_points(lane, u, v);
         });
       }
-      if (knows_still(frame)) take_still(batch, first, packets);
       if (frame.shadow_reach != nullptr) batch.cast_shadows(counts);
       for_lanes([&](int lane, int row, int column) {
         const std::size_t point = static_cast<std::size_t>(row) * columns + column;
         if (samples == 1) sheet_triangles[point] = batch.sheet_triangle(lane);
-        const float* ambient = bounced.empty() ? nullptr : bounced.data() + point * bands;
+        float memory[kMaxBands];
+        const float* ambient = bounced_at(batch, lane, point, memory);
         if (spreads) {
           float out[kMaxBands] = {};
           batch.add(lane, whole.data(), ambient, out);
@@ -100,6 +101,24 @@ void DirectRenderer::Parts::cast(const DirectFrame& frame, DirectImage& image) {
   count_up(counted, image);
 }
 
+const float* DirectRenderer::Parts::bounced_at(const DirectBatch& batch, int lane, std::size_t point,
+                                               float* memory) const {
+  if (bounced.empty()) return nullptr;
+  const auto bands = static_cast<std::size_t>(rays.bands);
+  const float* const at_rest = bounced.data() + point * bands;
+  if (rest_normals.empty()) return at_rest;
+  const float* const before = rest_normals.data() + 3 * point;
+  const auto met = batch.sheet_place(lane);
+  if (!met || (before[0] == 0.0f && before[1] == 0.0f && before[2] == 0.0f)) return at_rest;
+  const float* const now = met->normal;
+  const float cosine = std::min(before[0] * now[0] + before[1] * now[1] + before[2] * now[2], 1.0f);
+  const float sheet = 0.5f * (1.0f - cosine);
+  for (std::size_t band = 0; band < bands; ++band) {
+    memory[band] = (1.0f - sheet) * at_rest[band] + sheet * rest_sends[point * bands + band];
+  }
+  return memory;
+}
+
 SheetPoints DirectRenderer::Parts::points_of(const DirectFrame& frame, const Surface& sheet) const {
   const int bands = rays.bands;
   const std::vector<Eigen::Vector2d>& material = sheet.print->material_mm;
@@ -116,11 +135,11 @@ SheetPoints DirectRenderer::Parts::points_of(const DirectFrame& frame, const Sur
   const std::vector<float> whole(bands, 1.0f);
   for_batches(rays, frame, [&](DirectBatch& batch, int first, int packets, DirectCounts& counts) {
     batch.intersect({rays.packets.data() + first, static_cast<std::size_t>(packets)}, counts);
-    if (knows_still(frame)) take_still(batch, first, packets);
     if (frame.shadow_reach != nullptr) batch.cast_shadows(counts);
     for_lanes_on_grid(rays, first, packets, [&](int lane, int row, int column) {
       const std::size_t point = static_cast<std::size_t>(row) * rays.grid.columns + column;
-      const float* ambient = bounced.empty() ? nullptr : bounced.data() + point * bands;
+      float memory[kMaxBands];
+      const float* ambient = bounced_at(batch, lane, point, memory);
       const auto met = batch.sheet_place(lane);
       if (!met) {
         std::array<float, kMaxBands> other{};
@@ -211,9 +230,6 @@ void DirectRenderer::Parts::refine(const DirectFrame& frame, DirectImage& image)
       for (int k = 0; k < count; ++k) {
         const DirectBatch::Visibility known = known_round(edges[first + k]);
         for (int ray = 0; ray < rays_a_point; ++ray) {
-          if (knows_still(frame)) {
-            take_still(batch, k * rays_a_point + ray, static_cast<std::size_t>(edges[first + k]));
-          }
           batch.take_as_known(k * rays_a_point + ray, known);
         }
       }
@@ -221,9 +237,12 @@ void DirectRenderer::Parts::refine(const DirectFrame& frame, DirectImage& image)
     }
     for (int k = 0; k < count; ++k) {
       const std::size_t point = edges[first + k];
-      const float* ambient = bounced.empty() ? nullptr : bounced.data() + point * bands;
       float out[kMaxBands] = {};
-      for (int ray = 0; ray < rays_a_point; ++ray) batch.add(k * rays_a_point + ray, share.data(), ambient, out);
+      for (int ray = 0; ray < rays_a_point; ++ray) {
+        const int lane = k * rays_a_point + ray;
+        float memory[kMaxBands];
+        batch.add(lane, share.data(), bounced_at(batch, lane, point, memory), out);
+      }
       for (int band = 0; band < bands; ++band) radiance[band * points + point] = out[band];
     }
   });
@@ -274,6 +293,7 @@ void DirectRenderer::set_bounced_light(const cv::Mat& irradiance) {
   Parts& parts = *parts_;
   const int bands = parts.rays.bands;
   parts.bounced.clear();
+  parts.rest_normals.clear();
   if (irradiance.empty()) return;
   if (irradiance.type() != CV_32FC(bands) || irradiance.cols != parts.width() || irradiance.rows != parts.height()) {
     fail("direct renderer: bounced light has {} x {} pixels of {} channels; {} x {} of {} are needed (32-bit floats)",
@@ -330,10 +350,33 @@ std::unique_ptr<DirectRenderer::Parts::Prepared> DirectRenderer::Parts::prepare(
         made->other ? !scene.surfaces.empty() && is_connected(scene.surfaces[0].mesh) : connected);
   }
   const ShadowReach* reach = made->shadow_reach ? &*made->shadow_reach : nullptr;
-  if (made->horizons && still) reach = &still->reach;
   made->frame.emplace(DirectFrame{fixture, made->other ? *made->other : tree, made->sheet ? &*made->sheet : nullptr,
                                   reach, made->horizons ? &*made->horizons : nullptr, made->materials});
   return made;
+}
+
+void DirectRenderer::set_bounced_light(const cv::Mat& irradiance, const Scene& rest) {
+  set_bounced_light(irradiance);
+  Parts& parts = *parts_;
+  // Of one ray a point; those of several go all over a pixel, and films dim what a sheet sends itself.
+  if (irradiance.empty() || parts.settings.samples > 1 || !parts.films.empty()) return;
+  const auto prepared = parts.prepare(rest);
+  const auto bands = static_cast<std::size_t>(parts.rays.bands);
+  const std::size_t points = static_cast<std::size_t>(parts.rays.grid.columns) * parts.rays.grid.rows;
+  std::vector<float> normals(3 * points, 0.0f);
+  parts.rest_sends.assign(bands * points, 0.0f);
+  for_batches(parts.rays, *prepared->frame, [&](DirectBatch& batch, int first, int packets, DirectCounts& counts) {
+    batch.intersect({parts.rays.packets.data() + first, static_cast<std::size_t>(packets)}, counts);
+    if (prepared->frame->shadow_reach != nullptr) batch.cast_shadows(counts);
+    for_lanes_on_grid(parts.rays, first, packets, [&](int lane, int row, int column) {
+      const auto met = batch.sheet_place(lane);
+      if (!met) return;
+      const std::size_t point = static_cast<std::size_t>(row) * parts.rays.grid.columns + column;
+      std::copy_n(met->normal, 3, normals.begin() + static_cast<std::ptrdiff_t>(3 * point));
+      batch.sent_back(lane, parts.bounced.data() + point * bands, parts.rest_sends.data() + point * bands);
+    });
+  });
+  parts.rest_normals = std::move(normals);
 }
 
 DirectImage DirectRenderer::render(const Scene& scene) {

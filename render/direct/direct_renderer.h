@@ -84,6 +84,9 @@ class DirectRenderer {
   /// CV_32FC(bands) of the camera's size, or empty for none. With it scenes may ask for interreflection.
   /// @throws Error for another size or type, or numbers that aren't finite
   void set_bounced_light(const cv::Mat& irradiance);
+  /// The same, of the sheet of `rest`, its first surface, which changes it where it has been tilted since: see
+  /// rest_light.h. @throws Error as above and as render
+  void set_bounced_light(const cv::Mat& irradiance, const Scene& rest);
 
  private:
   struct Parts;

@@ -19,6 +19,7 @@ float DirectBatch::soft_width(int lane, int lamp, float tangent) const {
   return std::max(kSharp, 2.0f * radius * (1.0f + tangent * tangent) / std::max(distance, 1e-3f));
 }
 
+/// What walls hide of a sector they hide from the flattest beam on: the first that they leave light of counts as that.
 /// A beam reaches half way to the flatter and the steeper one beside it, one at the rim as far outwards as inwards;
 /// aside a sector is looked at in two places, half way to where it ends.
 void DirectBatch::find_beams(int lane) {
@@ -30,6 +31,10 @@ void DirectBatch::find_beams(int lane) {
     const Four z = four(flow + group * 12 + 8);
     Eigen::Map<Four>(tangents + group * 4) = z.abs() / (x * x + y * y).max(1e-30f).sqrt();
   }
+  const auto first_lit = [&](int lamp) {
+    while (lamp >= 0 && tangents[lamp] == 0.0f) lamp = field_.beside[lamp].steeper;
+    return lamp;
+  };
   const auto azimuth_of = [&](int lamp) {
     const float* from = flow + lamp / 4 * 12 + lamp % 4;
     return SheetHorizons::azimuth(-from[0], -from[4]);
@@ -39,24 +44,27 @@ void DirectBatch::find_beams(int lane) {
   beams_.highest.resize(static_cast<std::size_t>(lamps_));
   for (int head = 0; head < lamps_; ++head) {
     if (fixture_.flattest[head] != head) continue;
-    const float azimuth = azimuth_of(head);
+    const int flattest = first_lit(head);
+    if (flattest < 0) continue;
+    const float azimuth = azimuth_of(flattest);
     const auto turn_to = [&](int other) {
       if (other < 0) return 0.0f;
       const float turn = azimuth_of(other) - azimuth;
       return turn > 2.0f ? turn - 4.0f : turn < -2.0f ? turn + 4.0f : turn;
     };
-    const BesideBeam& aside = field_.beside[head];
-    float left = 0.25f * turn_to(aside.left);
-    float right = 0.25f * turn_to(aside.right);
-    if (aside.left < 0) left = -right;
-    if (aside.right < 0) right = -left;
+    const int to_left = first_lit(field_.beside[head].left);
+    const int to_right = first_lit(field_.beside[head].right);
+    float left = 0.25f * turn_to(to_left);
+    float right = 0.25f * turn_to(to_right);
+    if (to_left < 0) left = -right;
+    if (to_right < 0) right = -left;
     const auto look = [](float towards) {
       const Eigen::Vector2f unit = SheetHorizons::heading(towards);
       return BeamSector::Look{towards, unit.x(), unit.y()};
     };
-    beams_.sectors.push_back({head, look(azimuth + left), look(azimuth + right)});
-    for (int lamp = head; lamp >= 0; lamp = field_.beside[lamp].steeper) {
-      const int flatter = field_.beside[lamp].flatter;
+    beams_.sectors.push_back({flattest, look(azimuth + left), look(azimuth + right)});
+    for (int lamp = flattest; lamp >= 0; lamp = field_.beside[lamp].steeper) {
+      const int flatter = lamp == flattest ? -1 : field_.beside[lamp].flatter;
       const int steeper = field_.beside[lamp].steeper;
       const float tangent = tangents[lamp];
       float down = flatter >= 0 ? 0.5f * (tangent - tangents[flatter]) : 0.0f;
@@ -158,17 +166,6 @@ void DirectBatch::take_as_known(int lane, const Visibility& known) {
     amounts(lane)[std::countr_zero(rest)] = 0.0f;
   }
   one.doubt &= ~(known.open | known.hidden);
-}
-
-void DirectBatch::take_shares(int lane, const std::uint8_t* one, const std::uint8_t* other, float part) {
-  if (!takes_light(lane)) return;
-  float* const amount = amounts(lane);
-  for (std::uint64_t rest = lanes_[lane].doubt; rest != 0; rest &= rest - 1) {
-    const int lamp = std::countr_zero(rest);
-    const auto from = static_cast<float>(one[lamp]);
-    amount[lamp] *= (from + part * (static_cast<float>(other[lamp]) - from)) / 255.0f;
-  }
-  lanes_[lane].doubt = 0;
 }
 
 DirectBatch::Visibility DirectBatch::visibility(int lane) const {

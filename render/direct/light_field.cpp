@@ -75,7 +75,7 @@ struct Maker {
     Eigen::Vector3d* to = flows.data();
     for (const PreparedLamp<1>& lamp : scene.lamps) {
       if (lamp.kind == LampKind::kGuide) {
-        guide_beam_flows(scene, lamp, settings.guides, layer, place, settings.guide_points, to);
+        guide_beam_flows(scene, lamp, settings.guides, layer, place, settings.guide_points, settings.walls, to);
       } else {
         *to = flow_of_lens(scene, lamp, layer, place, settings.lens_points);
       }
@@ -346,6 +346,28 @@ void check_reach(const Scene& fixture, const Eigen::AlignedBox3d& reach) {
 
 }  // namespace
 
+UprightWalls walls_round_sheet(const Scene& rest, const Eigen::AlignedBox3d& reach) {
+  constexpr double kRim_mm = 0.05;  // a sheet's rim may stand out so far, as that of a round one does from its facets
+  if (rest.surfaces.size() != 2 || !rest.balls.empty() || rest.lamps.empty()) return {};
+  const double middle = reach.center().z();
+  const bool lamps_below = lamp_position(rest.lamps.front()).z() < middle;
+  const auto above = std::ranges::find_if(rest.faces, [&](const FlatFace& face) { return face.z > middle; });
+  if (above == (lamps_below ? rest.faces.begin() : rest.faces.end())) return {};
+  UprightWalls walls(rest.surfaces[1].mesh, lamps_below ? std::prev(above)->z : above->z);
+  if (walls.empty()) return {};
+  bool hide = false;
+  for (const Lamp& lamp : rest.lamps) {
+    const Eigen::Vector3d& place = lamp_position(lamp);
+    const bool outside = walls.beyond(place.head<2>()) > kRim_mm;
+    if ((place.z() < middle) != lamps_below || (outside && !std::holds_alternative<GuideLamp>(lamp))) return {};
+    hide = hide || outside;
+  }
+  const bool within = std::ranges::all_of(rest.surfaces[0].mesh.vertices, [&](const Eigen::Vector3d& vertex) {
+    return walls.beyond(vertex.head<2>()) <= kRim_mm;
+  });
+  return hide && within ? walls : UprightWalls{};
+}
+
 LightField make_light_field(const Scene& fixture, const Eigen::AlignedBox3d& reach,
                             const LightFieldSettings& settings) {
   LightField field;
@@ -357,6 +379,7 @@ LightField make_light_field(const Scene& fixture, const Eigen::AlignedBox3d& rea
   if (fixture.lamps.empty()) fail("light field: the scene has no lamps; without them there is no field");
   check_reach(fixture, reach);
   field.reach = reach;
+  field.walls = settings.walls;
   // By the box's middle, since it may end just on a face.
   const double middle = reach.center().z();
   for (const FlatFace& face : fixture.faces) field.layer += face.z < middle ? 1 : 0;

@@ -22,6 +22,8 @@ struct LightFieldSettings {
   int guide_points = 3;       ///< guide_beam_flows, 1 to 16
   int most_beams = 64;        ///< of all lamps together, see LightField; a direct renderer takes no more
   int most_flows = 64000000;  ///< nodes times beams, of 16 bytes each
+  /// Round what is lit, on the face of its layer that light guides are beyond: their light has their shadows.
+  UprightWalls walls;
   /// What is lit stays so near to the z axis, mm: only there the grid has to be accurate. 0: in all of the box.
   double lit_radius = 0.0;
 };
@@ -43,6 +45,7 @@ struct LightField {
   Eigen::AlignedBox3d reach;
   int layer = 0;  ///< the box lies in it: number of faces below
   double index = 1.0;
+  UprightWalls walls;  ///< LightFieldSettings::walls
   Eigen::Array3i nodes = Eigen::Array3i::Zero();
   Eigen::Array3d step = Eigen::Array3d::Zero();  ///< mm
   std::vector<int> lamp_of;                      ///< index into fixture.lamps, by beam; beams of a lamp in a row
@@ -57,6 +60,11 @@ struct LightField {
   int beam_count() const { return static_cast<int>(intensity.size()); }
   const Lamp& lamp(int beam) const { return fixture.lamps[lamp_of[beam]]; }
 };
+
+/// The frame of a sheet as walls, for a field over `reach`: where it is the only other thing of `rest`, stands upright
+/// on the face that the lamps are beyond, and hides light guides that stand outside of it. Else none: then nothing is
+/// hidden, or rays have to say what.
+UprightWalls walls_round_sheet(const Scene& rest, const Eigen::AlignedBox3d& reach);
 
 /// Computes the field of `fixture`'s lamps (surfaces and balls are ignored) over `reach`, which must lie between two
 /// flat faces. The grid starts coarse and is halved along its worst axis until the estimated error is below

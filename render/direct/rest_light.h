@@ -23,8 +23,12 @@ struct RestLightSettings {
 ///
 /// Light that has bounced comes from the whole neighbourhood, so where a membrane is pressed it changes less than
 /// direct light does: what is carried is therefore a sum, not a ratio, which would take bounced light away in a shadow.
-/// Left out is that pressing changes it at all: a dent shades its own floor and turns it away from the faces that
-/// mirror. measure_direct_error (direct_error.h) tells how much that is.
+/// What changes it most is that the flanks of a dent see the sheet round it. A facet tilted by t against an endless
+/// plane sees it under the form factor (1 - cos t) / 2 (Nusselt's projection: a half disc less a half ellipse), so with
+/// the scene at rest given to set_bounced_light a matt sheet that has been tilted by t gets
+///   (1 + cos t) / 2 times the light at rest + (1 - cos t) / 2 times what the same place sent back at rest.
+/// Left out is that a facet faces a brighter or darker side, and what a level place sees of flanks beside it.
+/// measure_direct_error (direct_error.h) tells how much that is.
 ///
 /// Noise of the path tracer is smoothed away with the response of the picture to a unit irradiance as weight, so that
 /// beads and printless edges don't smear.

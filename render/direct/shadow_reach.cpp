@@ -130,24 +130,32 @@ Eigen::AlignedBox2d outline(const Lamp& lamp) {
   return {Eigen::Vector2d(middle - half), Eigen::Vector2d(middle + half)};
 }
 
-/// Tells what stands round the sheet, seen along z and less a rim that pressing moves, and so can't hide lamps within.
+/// Tells what needn't be asked for shadows: walls whose shadows the light field has, and what stands round the sheet,
+/// seen along z and less a rim that pressing moves, and so can't hide lamps within.
 class WallsRound {
  public:
   WallsRound(const LampBearings& bearings, const Eigen::AlignedBox3d& sheet)
-      : inner_(Eigen::Vector2d(sheet.min().head<2>().array() + kRim),
+      : known_(bearings.walls),
+        inner_(Eigen::Vector2d(sheet.min().head<2>().array() + kRim),
                Eigen::Vector2d(sheet.max().head<2>().array() - kRim)) {
     const Eigen::AlignedBox2d outer(Eigen::Vector2d(sheet.min().head<2>().array() - kRim),
                                     Eigen::Vector2d(sheet.max().head<2>().array() + kRim));
     enclosed_ = !bearings.shining.isEmpty() && !inner_.isEmpty() && outer.contains(bearings.shining);
   }
 
-  bool contain(const Eigen::AlignedBox3d& part) const {
+  bool contain(const TriangleMesh& mesh, const std::array<int, 3>& triangle) const {
+    const std::array<Eigen::Vector3d, 3> corners = {mesh.vertices[triangle[0]], mesh.vertices[triangle[1]],
+                                                    mesh.vertices[triangle[2]]};
+    if (known_.hold(corners)) return true;
+    Eigen::AlignedBox3d part;
+    for (const Eigen::Vector3d& corner : corners) part.extend(corner);
     return enclosed_ && ((part.max().head<2>().array() <= inner_.min().array()).any() ||
                          (part.min().head<2>().array() >= inner_.max().array()).any());
   }
 
  private:
   static constexpr double kRim = 0.05;  // mm
+  const UprightWalls& known_;
   Eigen::AlignedBox2d inner_;
   bool enclosed_ = false;
 };
@@ -159,11 +167,8 @@ bool is_sheet_alone(const LampBearings& bearings, const Scene& scene) {
   const WallsRound walls(bearings, box_of(scene.surfaces[0].mesh));
   return std::all_of(scene.surfaces.begin() + 1, scene.surfaces.end(), [&](const Surface& surface) {
     if (is_film(surface)) return true;
-    return std::ranges::all_of(surface.mesh.triangles, [&](const std::array<int, 3>& t) {
-      Eigen::AlignedBox3d part;
-      for (int corner : t) part.extend(surface.mesh.vertices[corner]);
-      return walls.contain(part);
-    });
+    return std::ranges::all_of(surface.mesh.triangles,
+                               [&](const std::array<int, 3>& t) { return walls.contain(surface.mesh, t); });
   });
 }
 
@@ -188,7 +193,7 @@ bool is_connected(const TriangleMesh& mesh) {
 }
 
 LampBearings::LampBearings(const LightField& field, bool soft)
-    : lamps(field.beam_count()), longest(field.beam_count(), 0.0f) {
+    : lamps(field.beam_count()), longest(field.beam_count(), 0.0f), walls(field.walls) {
   const Eigen::Vector3d size = field.reach.sizes();
   cell = static_cast<float>(std::max(size.x(), size.y()) / kMostCells);
   left = static_cast<float>(field.reach.min().x());
@@ -294,9 +299,8 @@ ShadowReach::ShadowReach(const LampBearings& bearings, const Scene& scene, bool 
     if (is_film(scene.surfaces[i])) continue;
     const TriangleMesh& other = scene.surfaces[i].mesh;
     for (const auto& t : other.triangles) {
-      Eigen::AlignedBox3d part;
-      for (int corner : t) part.extend(other.vertices[corner]);
-      if (!walls.contain(part)) solid.extend(part);
+      if (walls.contain(other, t)) continue;
+      for (int corner : t) solid.extend(other.vertices[corner]);
     }
   }
   Eigen::AlignedBox3d everything = solid;
@@ -317,9 +321,9 @@ ShadowReach::ShadowReach(const LampBearings& bearings, const Scene& scene, bool 
     if (is_film(scene.surfaces[i])) continue;
     const TriangleMesh& other = scene.surfaces[i].mesh;
     for (const auto& t : other.triangles) {
+      if (walls.contain(other, t)) continue;
       Eigen::AlignedBox3d part;
       for (int corner : t) part.extend(other.vertices[corner]);
-      if (walls.contain(part)) continue;
       only_sheet_ = false;
       over_cells(map, part.min().x(), part.max().x(), part.min().y(), part.max().y(),
                  [&](std::size_t cell) { ground.slope[cell] = kEndless; });

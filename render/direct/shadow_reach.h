@@ -33,6 +33,7 @@ struct LampBearings {
   /// Round all lamps' luminous faces, seen along z. Layers have level faces, so light that passes them keeps its
   /// azimuth: from lamp to place it runs straight in the level plane.
   Eigen::AlignedBox2d shining;
+  UprightWalls walls;  ///< whose shadows the field has
 
   /// `soft`: shadow rays will go to all points of each lens, not to its middle only.
   LampBearings(const LightField& field, bool soft);

@@ -50,10 +50,17 @@ const Rule& rule_of(int points) {
   return rules[points - 1];
 }
 
+/// How steep light must be in the plate to come in between walls `distance` mm before the receiver: it then meets the
+/// layer's face just at their foot, and n cos(elevation) is the same on both sides of a face.
+double steepness_between_walls(double plate_index, const Layer& last, double distance) {
+  const double flat = distance / std::hypot(distance, last.thickness);
+  return std::acos(std::min(1.0, last.index * flat / plate_index));
+}
+
 }  // namespace
 
 void guide_beam_flows(const PreparedScene<1>& scene, const PreparedLamp<1>& lamp, const GuideCut& cut, int layer,
-                      const Eigen::Vector3d& place, int points, Eigen::Vector3d* out) {
+                      const Eigen::Vector3d& place, int points, const UprightWalls& walls, Eigen::Vector3d* out) {
   TS_ASSERT(lamp.kind == LampKind::kGuide && points >= 1 && cut.sectors >= 1 && cut.slices >= 1);
   std::fill_n(out, cut.beams(), Eigen::Vector3d::Zero());
   TS_ASSERT(layer != lamp.layer);
@@ -76,9 +83,15 @@ void guide_beam_flows(const PreparedScene<1>& scene, const PreparedLamp<1>& lamp
       const double width = rule.weight[i] / (cut.sectors * azimuths.density(azimuth));
       const GuideBearing bearing = guide_bearing(lamp, before.forward, azimuth);
       const auto edge = [&](double height) { return steepness_from(scene, medium, beyond, height, bearing.distance); };
-      const auto light_between = [&](double low, double high, int upright_count) {
-        const Rule& upright = rule_of(upright_count);
+      const double least = walls.empty()
+                               ? 0.0
+                               : steepness_between_walls(scene.media[medium].index, beyond.layers[beyond.count - 1],
+                                                         walls.distance(place.head<2>(), -bearing.toward.head<2>()));
+      const auto light_between = [&](double from, double high, int upright_count) {
+        const double low = std::max(from, least);
         Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+        if (!(high > low)) return sum;
+        const Rule& upright = rule_of(upright_count);
         for (int j = 0; j < upright_count; ++j) {
           Arrival<1> arrival;
           const double steepness = low + (high - low) * upright.node[j];
@@ -106,7 +119,8 @@ void guide_beam_flows(const PreparedScene<1>& scene, const PreparedLamp<1>& lamp
         all += light;
         low = high;
         // Two in a row: of a leaning lobe every second image may be dark.
-        if (light.norm() + last.norm() <= kNegligible * all.norm() && std::abs(bearing.crest) < low) break;
+        if (low > least && light.norm() + last.norm() <= kNegligible * all.norm() && std::abs(bearing.crest) < low)
+          break;
         last = light;
       }
     }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "render/lamps/prepared_scene.h"
+#include "render/lamps/upright_walls.h"
 
 namespace touchstone::render {
 
@@ -21,10 +22,11 @@ struct GuideCut {
 };
 
 /// The vector irradiance (W/m^2, along the light) of each beam of guide `lamp` at a place of `layer`, beyond its plate,
-/// without shadows: by Gauss and Legendre's rule with `points` azimuths a sector and `points` elevations a slice. The
-/// beams of a sector stand together, from flat to steep.
+/// without shadows but those of `walls` that stand on the layer's face towards the plate: by Gauss and Legendre's rule
+/// with `points` azimuths a sector and `points` elevations of what of a slice isn't hidden. The beams of a sector stand
+/// together, from flat to steep.
 /// @pre `layer` isn't the plate's; `out` has space for cut.beams()
 void guide_beam_flows(const PreparedScene<1>& scene, const PreparedLamp<1>& lamp, const GuideCut& cut, int layer,
-                      const Eigen::Vector3d& place, int points, Eigen::Vector3d* out);
+                      const Eigen::Vector3d& place, int points, const UprightWalls& walls, Eigen::Vector3d* out);
 
 }  // namespace touchstone::render

@@ -242,6 +242,18 @@ void plan_relief(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   }
 }
 
+/// The part of its light that a coating sends straight to itself, evenly bright: a cap of the height h on a sphere of
+/// the radius R sends each of its places h / (2 R), as all of a sphere sends evenly to all of it. Of a fingertip its
+/// round end; a flat one none.
+double self_view(const GelSpec& gel) {
+  if (const DomeSpec* dome = gel.dome()) {
+    const double radius = dome->sphere_radius_mm;
+    const double base = std::min(dome->base_radius_mm, radius);
+    return 0.5 * (1.0 - std::sqrt(1.0 - base * base / (radius * radius)));
+  }
+  return gel.fingertip() != nullptr ? 0.5 : 0.0;
+}
+
 void plan_interreflection(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   const DeviceSpec& device = scene.device;
   const GelSpec& gel = device.gel;
@@ -253,7 +265,10 @@ void plan_interreflection(const SceneSpec& scene, Plan& plan, PlanTable& table) 
   double albedo = 0.0;
   double gain = 0.0;
   const auto judge = [&](double own, double radius) {
-    const double own_gain = interreflection_estimate(gel, device.plate, own, radius);
+    // What comes back after one bounce; that of all of them is the geometric series.
+    const double by_plate = interreflection_estimate(gel, device.plate, own, radius);
+    const double once = by_plate / (1.0 + by_plate) + (device.coating ? own * self_view(gel) : 0.0);
+    const double own_gain = once / (1.0 - once);
     if (own_gain > gain) {
       albedo = own;
       gain = own_gain;
@@ -268,9 +283,10 @@ void plan_interreflection(const SceneSpec& scene, Plan& plan, PlanTable& table) 
       judge(moved.object.radiance ? 0.0 : brightest, bright_radius(moved.object));
     }
   }
-  const std::string why = fmt::format(
-      "{} of albedo {:.2g} gives itself {:.1f} % of its light back through the plate; allowed to leave out is {:.1f} %",
-      device.coating ? "a coating" : "an object", albedo, 100 * gain, 100 * scene.light.interreflection_tolerance);
+  const std::string why =
+      fmt::format("{} of albedo {:.2g} gives itself {:.1f} % of its light{}; allowed to leave out is {:.1f} %",
+                  device.coating ? "a coating" : "an object", albedo, 100 * gain,
+                  device.coating ? "" : " back through the plate", 100 * scene.light.interreflection_tolerance);
   // What the room sends onto a coating is light that only a bounce brings to the camera.
   const bool lit_by_room = device.coating && device.room_radiance.largest() > 0.0;
   plan.interreflection = table.add("interreflection", scene.effects.interreflection,

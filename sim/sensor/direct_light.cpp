@@ -138,6 +138,7 @@ DirectLight::DirectLight(const SceneView& view, const render::Camera& camera, co
   field_.fixture = rest_;
   field_.fixture.surfaces.clear();
   field_.fixture.balls.clear();
+  field_.walls = render::walls_round_sheet(rest_, field_.reach);
   rest_.interreflection = false;
   const Eigen::Index bands = rest_.environment.size();
   const auto lamps = static_cast<int>(rest_.lamps.size());
@@ -166,7 +167,7 @@ std::unique_ptr<render::DirectRenderer> DirectLight::borrow() const {
     }
   }
   auto renderer = std::make_unique<render::DirectRenderer>(field_, camera_, rest_, settings_);
-  renderer->set_bounced_light(bounced_);
+  renderer->set_bounced_light(bounced_, rest_);
   return renderer;
 }
 

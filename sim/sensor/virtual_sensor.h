@@ -32,7 +32,8 @@ struct VirtualSensorSettings {
   double deepest_mm = 1.2;    ///< how far the gel will be pressed in: what a light field has to hold
   double widest_mm = 0.5;     ///< how far it will be sheared
   double membrane_um = 40.0;  ///< pixels of the fine contact (MembraneSpec::pixel_um)
-  double interreflection_tolerance = 0.05;
+  /// Part of a coating's light that bounces to it and may be left out. Direct light carries it at no cost a picture.
+  double interreflection_tolerance = 0.005;
   bool always_friction = false;  ///< also in straight presses, where the plan leaves it out: it holds the surface
                                  ///< together under an object, which else stretches
   int edge_side = 4;  ///< rays along a side of pixels that differ from those beside them (render::DirectSettings): on a

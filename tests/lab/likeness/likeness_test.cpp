@@ -47,8 +47,8 @@ camera:
   focus_distance_mm: 17
   lens_position_mm: [0, 0, -19]
   look_at_mm: [0, 0, 0]
-  exposure_us: 55
-  full_well_e: 12000
+  exposure_us: 83
+  full_well_e: 20000
   read_noise_e: 8
   bayer: binned
   white_balance: [1, 1, 1]

@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 
 #include "core/error.h"
+#include "render/cameras/first_hits.h"
 #include "render/direct/direct_error.h"
 #include "tests/render/paths/light_scenes.h"
 
@@ -150,6 +151,46 @@ TEST(RestLight, MostOfItStaysWhereTheMembraneIsPressed) {
   EXPECT_LT(with.rms, 0.25 * without.rms);
   renderer.set_bounced_light({});
   EXPECT_THROW(renderer.render(pressed), Error);  // asks for interreflection again
+}
+
+/// How much darker than paths a picture is in a dent, of what the paths show there; and the standard error of that.
+Estimate missing_in_dent(const cv::Mat& picture, const Scene& pressed, double radius) {
+  const std::vector<FirstHit> hits = first_hits(pressed, make_ready(Camera(camera())));
+  cv::Mat mask = cv::Mat::zeros(picture.size(), CV_8U);
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    if (hits[i].object == 0 && hits[i].position.head<2>().norm() < radius) mask.data[i] = 255;
+  }
+  constexpr int kRuns = 8;
+  double sum = 0.0;
+  double squares = 0.0;
+  for (int run = 0; run < kRuns; ++run) {
+    RenderSettings paths = samples(128);
+    paths.seed = 100 + run;
+    paths.max_depth = 16;
+    const double traced = cv::mean(Tracer(pressed).render(camera(), paths, mask).irradiance, mask)[0];
+    const double missing = 1.0 - cv::mean(picture, mask)[0] / traced;
+    sum += missing / kRuns;
+    squares += missing * missing / kRuns;
+  }
+  return {sum, std::sqrt(std::max(0.0, squares - sum * sum) / (kRuns - 1))};
+}
+
+// The flanks of a dent see the sheet round it.
+TEST(RestLight, FlanksGetWhatTheSheetSendsThem) {
+  const Scene rest = membrane(0.0, true);
+  const Scene pressed = membrane(1.0, true);
+  DirectRenderer renderer = renderer_of(rest);
+  const cv::Mat light = measure_rest_light(renderer, rest, camera());
+  renderer.set_bounced_light(light);
+  const Estimate without = missing_in_dent(renderer.render(pressed).irradiance, pressed, 2.0);
+  renderer.set_bounced_light(light, rest);
+  const Estimate with = missing_in_dent(renderer.render(pressed).irradiance, pressed, 2.0);
+  EXPECT_GT(without.mean, 5.0 * without.error) << "nothing bounces that matters";
+  EXPECT_LT(std::abs(with.mean), 0.5 * without.mean + 2.0 * with.error);
+  // The sheet itself at rest is as it was.
+  const cv::Mat still = renderer.render(rest).irradiance;
+  renderer.set_bounced_light(light);
+  EXPECT_LT(cv::norm(still, renderer.render(rest).irradiance, cv::NORM_INF), 1e-5 * cv::norm(still, cv::NORM_INF));
 }
 
 TEST(RestLight, SameBytesForAnyThreads) {
