@@ -170,6 +170,56 @@ class Search {
   Marks marks_;
 };
 
+/// A part of a text and what is to stand there.
+struct Edit {
+  std::size_t begin, size;
+  std::string text;
+};
+
+std::string edited(const std::string& text, std::vector<Edit> edits) {
+  std::ranges::sort(edits, {}, &Edit::begin);
+  std::string out;
+  std::size_t at = 0;
+  for (const Edit& edit : edits) {
+    TS_ASSERT(edit.begin >= at && edit.begin + edit.size <= text.size());
+    out.append(text, at, edit.begin - at);
+    out += edit.text;
+    at = edit.begin + edit.size;
+  }
+  out.append(text, at);
+  return out;
+}
+
+std::string in_quotes(const std::string& word) {
+  std::string out = "'";
+  for (const char c : word) out += c == '\'' ? "''" : std::string(1, c);
+  return out + "'";
+}
+
+/// An edit for each of the values that name files.
+void move_files(const YAML::Node& node, const std::string& text, const std::filesystem::path& from,
+                const std::filesystem::path& to, std::map<std::size_t, Edit>& edits, int depth = 0) {
+  if (depth > kDeepest) return;
+  if (node.IsMap()) {
+    for (const auto& entry : node) move_files(entry.second, text, from, to, edits, depth + 1);
+  } else if (node.IsSequence()) {
+    for (const YAML::Node& item : node) move_files(item, text, from, to, edits, depth + 1);
+  }
+  if (!node.IsScalar() || node.Mark().is_null()) return;
+  const std::string& word = node.Scalar();
+  const std::filesystem::path named(word);
+  std::error_code none;
+  if (word.find('.') == std::string::npos || named.is_absolute() ||
+      !std::filesystem::is_regular_file(from / named, none))
+    return;
+  const auto begin = static_cast<std::size_t>(node.Mark().pos);
+  if (begin >= text.size()) return;
+  const bool quoted = text[begin] == '\'' || text[begin] == '"';
+  if (text.compare(begin + (quoted ? 1 : 0), word.size(), word) != 0) return;  // has escapes, or isn't in bytes
+  edits[begin] = {begin, word.size() + (quoted ? 2 : 0),
+                  in_quotes(std::filesystem::relative(from / named, to).string())};
+}
+
 }  // namespace
 
 std::vector<std::vector<YamlNumber>> find_yaml_numbers(const std::string& text, const std::string& name,
@@ -178,18 +228,23 @@ std::vector<std::vector<YamlNumber>> find_yaml_numbers(const std::string& text, 
 }
 
 std::string with_yaml_numbers(const std::string& text, const std::vector<std::pair<YamlNumber, double>>& numbers) {
-  std::vector<std::pair<YamlNumber, double>> sorted = numbers;
-  std::sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) { return a.first.begin < b.first.begin; });
-  std::string edited;
-  std::size_t at = 0;
-  for (const auto& [number, value] : sorted) {
-    TS_ASSERT(number.begin >= at && number.begin + number.size <= text.size() && std::isfinite(value));
-    edited.append(text, at, number.begin - at);
-    edited += fmt::format("{}", value);
-    at = number.begin + number.size;
+  std::vector<Edit> edits;
+  for (const auto& [number, value] : numbers) {
+    TS_ASSERT(std::isfinite(value));
+    edits.push_back({number.begin, number.size, fmt::format("{}", value)});
   }
-  edited.append(text, at);
-  return edited;
+  return edited(text, std::move(edits));
+}
+
+std::string with_yaml_files_from(const std::string& text, const std::filesystem::path& from,
+                                 const std::filesystem::path& to) {
+  std::map<std::size_t, Edit> found;  // an alias' value stands once in the text
+  const YAML::Node root = YAML::Load(text);
+  if (!Marks().count(root)) return text;
+  move_files(root, text, from, to, found);
+  std::vector<Edit> edits;
+  for (const auto& [begin, edit] : found) edits.push_back(edit);
+  return edited(text, std::move(edits));
 }
 
 }  // namespace touchstone

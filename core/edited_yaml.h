@@ -1,7 +1,9 @@
 #pragma once
-// Numbers of a YAML document changed in its text: all else stays as it was written, and every line keeps its number.
+// Numbers and files' names of a YAML document changed in its text: all else stays as it was written, and every line
+// keeps its number.
 
 #include <cstddef>
+#include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
@@ -29,5 +31,12 @@ std::vector<std::vector<YamlNumber>> find_yaml_numbers(const std::string& text, 
 /// The text with other numbers (the shortest decimal ones that are read back as they are). @pre `numbers` were found in
 /// this very text, none twice
 std::string with_yaml_numbers(const std::string& text, const std::vector<std::pair<YamlNumber, double>>& numbers);
+
+/// The text for a file in the folder `to` that was one in `from`: each value that is the relative name of a file in
+/// `from`, with a dot in it, is named from `to` on. Other values stay, also the names of files that aren't there, and
+/// all of a text that aliases make larger than 100,000 values.
+/// @pre the text is YAML
+std::string with_yaml_files_from(const std::string& text, const std::filesystem::path& from,
+                                 const std::filesystem::path& to);
 
 }  // namespace touchstone

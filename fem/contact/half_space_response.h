@@ -14,6 +14,7 @@ namespace touchstone::fem {
 /// normal traction by a normal one, along either tangent by a normal one, and what tangential ones have beyond the
 /// first. Plain arithmetic, for loops over many points.
 struct ResponseTerms {
+  /// `nu` is Poisson's ratio, `inverse` in 1/mm.
   ResponseTerms(double nu, double x, double y, double inverse) {
     const double flat2 = x * x + y * y;
     const double over_flat2 = 1.0 / (flat2 > 1e-100 ? flat2 : 1e-100);

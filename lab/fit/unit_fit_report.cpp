@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "core/edited_yaml.h"
 #include "core/error.h"
 #include "core/whole_file.h"
 #include "datasets/inspection/contact_sheet.h"
@@ -222,15 +223,16 @@ UnitFitRun run_unit_fit(const std::filesystem::path& file, const std::filesystem
   const UnitRecording recording = read_recording(fit);
   FitCourse course;
   course.on_plan = on_plan;
-  course.on_step = [&](int, double, const std::string& device_text) {
-    write_whole_file(place.file(".so-far.yaml"), device_text);
+  const auto write_device = [&](const char* ending, const std::string& text) {
+    write_whole_file(place.file(ending), with_yaml_files_from(text, asked.device.parent_path(), folder));
   };
+  course.on_step = [&](int, double, const std::string& text) { write_device(".so-far.yaml", text); };
   course.keep = [&](const FitSoFar& so_far) { place.keep(so_far); };
   course.from = place.so_far();
   if (course.from) run.gone_on_from = course.from->search.steps;
   run.fit = fit_unit(fit, recording, cache_folder, progress, course);
   write_whole_file(place.file(".md"), to_markdown(fit, run.fit));
-  write_whole_file(place.file(".yaml"), run.fit.device_text);
+  write_device(".yaml", run.fit.device_text);
   sim::write_png(place.file(".png"), misfit_sheet(recording, run.fit));
   write_whole_file(place.file(".json"), to_json(fit, run.fit, place.identity()));  // the last: with it all is there
   std::filesystem::remove(place.file(".so-far.yaml"));

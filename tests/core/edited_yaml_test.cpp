@@ -3,10 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+
 #include <string>
 #include <utility>
 
 #include "tests/support/message_of.h"
+#include "tests/support/temporary_folder.h"
 
 namespace touchstone {
 namespace {
@@ -77,6 +80,34 @@ TEST(EditedYaml, WhatStandsTooDeepIsRefused) {
   const std::string lists = "k: " + std::string(70, '[') + "1" + std::string(70, ']');
   EXPECT_THAT(message_of([&] { find_yaml_numbers(lists, "device.yaml", "k", {}); }), HasSubstr("more than 64"));
   EXPECT_THAT(message_of([&] { find_yaml_numbers("k: &x [*x]", "device.yaml", "k", {}); }), HasSubstr("holds itself"));
+}
+
+TEST(EditedYaml, FilesAreNamedFromAnotherFolderOn) {
+  test::TemporaryFolder folder;
+  namespace fs = std::filesystem;
+  fs::create_directories(folder.path() / "devices/maps");
+  fs::create_directories(folder.path() / "o'ut/fit");
+  for (const char* file : {"devices/rest.png", "devices/maps/a b.yaml", "devices/name"}) folder.write(file, "");
+  const std::string text =
+      "name: name               # a file without a dot isn't meant\n"
+      "background: rest.png     # of the unit\n"
+      "residual: \"maps/a b.yaml\"\n"
+      "lamps: [{spectrum: {file: missing.csv}}, &x {pattern: maps/../rest.png}, *x]\n"
+      "whole: " +
+      (folder.path() / "devices/rest.png").string() + "\n";
+  const std::string moved = with_yaml_files_from(text, folder.path() / "devices", folder.path() / "o'ut/fit");
+  EXPECT_EQ(moved,
+            "name: name               # a file without a dot isn't meant\n"
+            "background: '../../devices/rest.png'     # of the unit\n"
+            "residual: '../../devices/maps/a b.yaml'\n"
+            "lamps: [{spectrum: {file: missing.csv}}, &x {pattern: '../../devices/rest.png'}, *x]\n"
+            "whole: " +
+                (folder.path() / "devices/rest.png").string() + "\n");
+  // Back again, from a folder with a quote in its name.
+  folder.write("o'ut/rest.png", "");
+  EXPECT_EQ(with_yaml_files_from("a: rest.png\n", folder.path() / "o'ut", folder.path() / "devices"),
+            "a: '../o''ut/rest.png'\n");
+  EXPECT_EQ(with_yaml_files_from("a: [x.y, 0.25]\n", folder.path() / "devices", folder.path()), "a: [x.y, 0.25]\n");
 }
 
 }  // namespace
