@@ -2,14 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <Eigen/Core>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <string>
-#include <tuple>
-#include <utility>
-#include <vector>
 
 #include "render/direct/direct_error.h"
 #include "render/imager/imager.h"
@@ -41,62 +39,37 @@ cv::Mat raster_of_pixels(const cv::Size& size, int apart) {
 }
 
 struct Offness {
-  double rms = 0.0, rms_error = 0.0, mean = 0.0;  // of the light's root mean square
-  double noises = 0.0, noises_error = 0.0;        // root mean square, of the imager's noise in the pixel and channel
+  render::DirectError light;
+  double noises = 0.0, noises_error = 0.0;  // root mean square, of the imager's noise in the pixel and channel
 };
 
-/// The root of a mean with its standard error, that of a root where it can't be distinguished from 0.
-std::pair<double, double> root_of(const std::vector<double>& squares) {
-  const auto count = static_cast<double>(squares.size());
-  double mean = 0.0;
-  for (const double square : squares) mean += square / count;
-  double spread = 0.0;
-  for (const double square : squares) spread += (square - mean) * (square - mean) / (count - 1.0) / count;
-  const double error = std::sqrt(spread);
-  return mean > error ? std::pair{std::sqrt(mean), 0.5 * error / std::sqrt(mean)}
-                      : std::pair{std::sqrt(std::max(0.0, mean)), std::sqrt(error)};
-}
-
-/// As render::measure_direct_error: products of differences from two independent renderings, free of the paths' noise.
 Offness offness_of(const cv::Mat& picture, const std::array<cv::Mat, 2>& traced, const cv::Mat& mask,
                    const render::Imager& imager) {
   const int bands = picture.channels();
   const render::ImagerResponse response = render::response_of(imager);
-  std::vector<double> products, in_noises;
-  double power = 0.0;
-  double shift = 0.0;
+  const auto channels = static_cast<int>(response.electrons_per_irradiance.rows());
+  // Electrons over their noise, for each channel; 0 beside the mask.
+  std::array<cv::Mat, 3> in_noises;
+  for (cv::Mat& one : in_noises) one = cv::Mat::zeros(picture.size(), CV_32FC(channels));
   for (int row = 0; row < picture.rows; ++row) {
     for (int column = 0; column < picture.cols; ++column) {
       if (mask.at<std::uint8_t>(row, column) == 0) continue;
-      const Eigen::Index first = Eigen::Index{bands} * column;
-      const auto at = [&](const cv::Mat& from) {
-        return Eigen::Map<const Eigen::VectorXf>(from.ptr<float>(row) + first, bands).cast<double>().eval();
+      const auto electrons = [&](const cv::Mat& from) -> Eigen::VectorXd {
+        const float* const first = from.ptr<float>(row) + std::ptrdiff_t{bands} * column;
+        return response.electrons_per_irradiance * Eigen::Map<const Eigen::VectorXf>(first, bands).cast<double>();
       };
-      const Eigen::VectorXd a = at(traced[0]);
-      const Eigen::VectorXd b = at(traced[1]);
-      const Eigen::VectorXd one = at(picture);
-      products.push_back((one - a).dot(one - b) / bands);
-      shift += (one - 0.5 * (a + b)).sum() / bands;
-      power += a.dot(b) / bands;
-      double noises = 0.0;
-      const Eigen::Index channels = response.electrons_per_irradiance.rows();
-      for (Eigen::Index channel = 0; channel < channels; ++channel) {
-        const auto per = response.electrons_per_irradiance.row(channel);
-        const double noise = render::noise_e(response, per.dot(0.5 * (a + b)));
-        noises += per.dot(one - a) * per.dot(one - b) / (noise * noise) / static_cast<double>(channels);
+      const std::array<Eigen::VectorXd, 3> seen = {electrons(traced[0]), electrons(traced[1]), electrons(picture)};
+      for (int channel = 0; channel < channels; ++channel) {
+        const double noise = render::noise_e(response, 0.5 * (seen[0][channel] + seen[1][channel]));
+        for (std::size_t k = 0; k < seen.size(); ++k) {
+          in_noises[k].ptr<float>(row)[channels * column + channel] = static_cast<float>(seen[k][channel] / noise);
+        }
       }
-      in_noises.push_back(noises);
     }
   }
-  const auto count = static_cast<double>(products.size());
-  const double whole = std::sqrt(power / count);
-  Offness off;
-  std::tie(off.rms, off.rms_error) = root_of(products);
-  off.rms /= whole;
-  off.rms_error /= whole;
-  off.mean = shift / count / whole;
-  std::tie(off.noises, off.noises_error) = root_of(in_noises);
-  return off;
+  const render::DirectError noises = render::direct_error_beside({in_noises[0], in_noises[1]}, in_noises[2], mask);
+  const double signal = std::sqrt(in_noises[0].dot(in_noises[1]) / (double(noises.pixels) * channels));
+  return {render::direct_error_beside(traced, picture, mask), signal * noises.rms, signal * noises.rms_error};
 }
 
 }  // namespace
@@ -131,8 +104,8 @@ ResultTable coated_error_table(const LightOptions& options) {
       const auto traced = render::trace_twice(all, camera, mask, samples, render::RestLightSettings{}.max_depth, 7);
       const Offness off = offness_of(touch.light, traced, mask, sim::imager(device, view.plan.bands, true));
       table.rows.push_back({name, fmt::format("{}, {} N", pressed, force_N),
-                            fmt::format("{:.2f} +- {:.2f}", 100 * off.rms, 100 * off.rms_error),
-                            fmt::format("{:+.2f}", 100 * off.mean),
+                            fmt::format("{:.2f} +- {:.2f}", 100 * off.light.rms, 100 * off.light.rms_error),
+                            fmt::format("{:+.2f}", 100 * off.light.mean),
                             fmt::format("{:.2f} +- {:.2f}", off.noises, off.noises_error)});
     }
   }

@@ -62,24 +62,13 @@ double smallest_rms(const DirectError& error) {
   return std::sqrt(std::max(0.0, error.rms * error.rms - kStandardErrors * square_error_of(error)));
 }
 
-DirectError measure_direct_error(const cv::Mat& picture, const Scene& scene, const Camera& camera,
-                                 const DirectErrorSettings& settings) {
-  const auto bands = static_cast<int>(scene.environment.size());
-  const Eigen::Vector2i size = size_of(camera);
-  if (settings.pixels < 2 || settings.samples < 1) {
-    fail("direct error: {} pixels of {} samples; at least 2 and 1 are needed", settings.pixels, settings.samples);
-  }
-  if (picture.type() != CV_32FC(bands) || picture.cols != size.x() || picture.rows != size.y()) {
-    fail("direct error: the picture has {} x {} pixels of {} channels; the camera has {} x {} of {} (32-bit floats)",
-         picture.cols, picture.rows, picture.channels(), size.x(), size.y(), bands);
-  }
-  const cv::Mat mask = spread_pixels(size, settings.pixels, settings.seed);
-  const auto traced = trace_twice(scene, camera, mask, settings.samples, settings.max_depth, settings.seed);
+DirectError direct_error_beside(const std::array<cv::Mat, 2>& traced, const cv::Mat& picture, const cv::Mat& mask) {
+  const int bands = picture.channels();
   std::vector<double> products;
   std::vector<double> differences;
   std::vector<double> powers;
-  for (int row = 0; row < size.y(); ++row) {
-    for (int column = 0; column < size.x(); ++column) {
+  for (int row = 0; row < picture.rows; ++row) {
+    for (int column = 0; column < picture.cols; ++column) {
       if (mask.at<unsigned char>(row, column) == 0) continue;
       double product = 0.0;
       double difference = 0.0;
@@ -113,6 +102,22 @@ DirectError measure_direct_error(const cv::Mat& picture, const Scene& scene, con
   error.mean = shift.value / std::sqrt(power);
   error.mean_error = shift.error / std::sqrt(power);
   return error;
+}
+
+DirectError measure_direct_error(const cv::Mat& picture, const Scene& scene, const Camera& camera,
+                                 const DirectErrorSettings& settings) {
+  const auto bands = static_cast<int>(scene.environment.size());
+  const Eigen::Vector2i size = size_of(camera);
+  if (settings.pixels < 2 || settings.samples < 1) {
+    fail("direct error: {} pixels of {} samples; at least 2 and 1 are needed", settings.pixels, settings.samples);
+  }
+  if (picture.type() != CV_32FC(bands) || picture.cols != size.x() || picture.rows != size.y()) {
+    fail("direct error: the picture has {} x {} pixels of {} channels; the camera has {} x {} of {} (32-bit floats)",
+         picture.cols, picture.rows, picture.channels(), size.x(), size.y(), bands);
+  }
+  const cv::Mat mask = spread_pixels(size, settings.pixels, settings.seed);
+  const auto traced = trace_twice(scene, camera, mask, settings.samples, settings.max_depth, settings.seed);
+  return direct_error_beside(traced, picture, mask);
 }
 
 DirectChoice choose_direct(const Scene& rest, const Scene& first, const Camera& camera,

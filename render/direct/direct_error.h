@@ -2,6 +2,7 @@
 // How far direct pictures are from what they stand for, measured on some hundred pixels: for a plan that chooses.
 
 #include <Eigen/Geometry>
+#include <array>
 #include <memory>
 #include <opencv2/core/mat.hpp>
 #include <string>
@@ -37,6 +38,9 @@ double smallest_rms(const DirectError& error);
 /// @throws Error as Tracer, or if the picture isn't CV_32FC(bands) of the camera's size, or settings are out of range
 DirectError measure_direct_error(const cv::Mat& picture, const Scene& scene, const Camera& camera,
                                  const DirectErrorSettings& settings = {});
+/// The same of two pictures that are traced already (trace_twice), at the pixels that `mask` (CV_8UC1) has.
+/// @pre all are CV_32F of one size and as many channels
+DirectError direct_error_beside(const std::array<cv::Mat, 2>& traced, const cv::Mat& picture, const cv::Mat& mask);
 
 /// A renderer that has been found good enough, or the reason why there's none.
 struct DirectChoice {
