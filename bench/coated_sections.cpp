@@ -1,14 +1,18 @@
 #include "bench/coated_sections.h"
 
 #include <fmt/format.h>
+#include <tbb/global_control.h>
 
 #include <Eigen/Core>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <vector>
 
+#include "bench/stopwatch.h"
 #include "render/direct/direct_error.h"
 #include "render/imager/imager.h"
 #include "render/paths/trace_twice.h"
@@ -36,6 +40,56 @@ cv::Mat raster_of_pixels(const cv::Size& size, int apart) {
     for (int column = apart / 2; column < size.width; column += apart) mask.at<std::uint8_t>(row, column) = 255;
   }
   return mask;
+}
+
+/// What changes from press to press, so that nothing is remembered: part of the force.
+constexpr double kForceStep = 0.02;
+
+/// Seconds of one thread for the parts of a labelled picture, and on the clock with all.
+struct PictureTimes {
+  double press = 0.0, contact = 0.0, light = 0.0, imager = 0.0, truth = 0.0;
+  double clock = 0.0, clock_all = 0.0;
+};
+
+PictureTimes times_of(const sim::VirtualSensor& sensor, const sim::VirtualSensorSettings& settings,
+                      const sim::ObjectSpec& object, double force_N, int repeats) {
+  const sim::TouchObject seen = sensor.object(object);
+  const sim::SceneSpec scene = sim::coated_scene(sensor.device(), settings, object, {});
+  const sim::SceneView view(scene, sim::make_plan(scene), sensor.gel());
+  const auto press_of = [&](int k) {
+    sim::PressSpec press;
+    press.force_N = force_N * (1.0 + kForceStep * k);
+    return press;
+  };
+  sensor.press(seen, press_of(0));  // what all touches share is made here
+  const auto mean_of = [&](auto&& work) {
+    const ProcessorStopwatch used;
+    for (int k = 1; k <= repeats; ++k) work(k);
+    return used.seconds() / repeats;
+  };
+  PictureTimes times;
+  {
+    const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+    std::vector<fem::PressState> states(static_cast<std::size_t>(repeats) + 1);
+    times.press = mean_of([&](int k) {
+      states[static_cast<std::size_t>(k)] = sensor.play(seen, sensor.motion_of(seen, press_of(k))).back().press;
+    });
+    const auto state = [&](int k) -> const fem::PressState& { return states[static_cast<std::size_t>(k)]; };
+    times.contact = mean_of([&](int k) { view.relief(state(k)); });
+    const double frame = mean_of([&](int k) { sensor.capture(seen, state(k), 1, k, false); });
+    const double all = mean_of([&](int k) { sensor.capture(seen, state(k), 1, k, true); });
+    const sim::Touch touch = sensor.press(seen, press_of(1));
+    times.imager = mean_of([&](int k) { touch.expose(static_cast<std::uint64_t>(k)); });
+    times.light = frame - times.contact - times.imager;
+    times.truth = all - frame;
+    const Stopwatch clock;
+    for (int k = 1; k <= repeats; ++k) sensor.press(seen, press_of(k));
+    times.clock = clock.seconds() / repeats;
+  }
+  const Stopwatch clock;
+  for (int k = 1; k <= repeats; ++k) sensor.press(seen, press_of(k));
+  times.clock_all = clock.seconds() / repeats;
+  return times;
 }
 
 struct Offness {
@@ -116,6 +170,38 @@ ResultTable coated_error_table(const LightOptions& options) {
           "root mean square.",
           apart, apart, samples),
       "Without a unit's own background and residual map, which path tracing doesn't know."};
+  return table;
+}
+
+ResultTable coated_time_table(const LightOptions& options) {
+  ResultTable table;
+  table.name = "light-coated-time";
+  table.title = "What a labelled picture of a coated device takes";
+  table.columns = {"device", "pressed by", "press, ms",     "contact, ms",    "light, ms", "imager, ms", "truth, ms",
+                   "sum, ms", "clock, ms",  "clock on all threads, ms"};
+  for (const char* name :
+       {"gelsight-flat", "gelsight-markers", "gelsight-portable", "gelsight-dome", "gelsight-mini"}) {
+    const std::string scenes = std::string(TOUCHSTONE_SOURCE_DIR) + "/scenes";
+    const sim::VirtualSensorSettings settings;
+    const sim::VirtualSensor sensor(sim::read_device(scenes + "/devices/" + name + ".yaml"), options.cache, settings);
+    for (const auto& [pressed, force_N] : kPresses) {
+      const sim::ObjectSpec object = sim::read_object(scenes + "/objects/" + pressed + ".yaml");
+      const PictureTimes times = times_of(sensor, settings, object, force_N, options.quick ? 3 : 10);
+      const double sum = times.press + times.contact + times.light + times.imager + times.truth;
+      std::vector<std::string> row = {name, fmt::format("{}, {} N", pressed, force_N)};
+      for (const double seconds : {times.press, times.contact, times.light, times.imager, times.truth, sum, times.clock,
+                                   times.clock_all}) {
+        row.push_back(fmt::format("{:.1f}", 1e3 * seconds));
+      }
+      table.rows.push_back(std::move(row));
+    }
+  }
+  table.remarks = {fmt::format(
+      "Processor time of one thread, the mean of {} presses whose forces differ by {} %. Contact: the fine contact "
+      "under the coarse press. Truth: heights and contact of each pixel. The last two columns are the clock's, on one "
+      "thread and on all {}.",
+      options.quick ? 3 : 10, 100 * kForceStep,
+      tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism))};
   return table;
 }
 
