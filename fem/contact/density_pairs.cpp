@@ -60,6 +60,7 @@ TS_WIDE_CLONES void see_terms(double nu, const double* axes, const double* __res
   double* const first_first = terms + 3 * count;
   double* const first_second = terms + 4 * count;
   double* const second_second = terms + 5 * count;
+#pragma GCC ivdep
   for (int j = 0; j < count; ++j) {
     const double x = axes[0] * dx[j] + axes[1] * dy[j] + axes[2] * dz[j];
     const double y = axes[3] * dx[j] + axes[4] * dy[j] + axes[5] * dz[j];

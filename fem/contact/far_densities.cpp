@@ -32,6 +32,7 @@ TS_WIDE_CLONES void place_points(const double* axes, const double* __restrict pa
   double* const step_y = place + 4 * count;
   double* const other_y = place + 5 * count;
   const double a = axes[0], b = axes[1], c = axes[2], d = axes[3], e = axes[4], f = axes[5];
+#pragma GCC ivdep
   for (int j = 0; j < count; ++j) {
     x[j] = a * dx[j] + b * dy[j] + c * dz[j];
     y[j] = d * dx[j] + e * dy[j] + f * dz[j];
@@ -75,6 +76,7 @@ TS_WIDE_CLONES void add_normal(double nu, const double* __restrict r, const doub
 TS_WIDE_CLONES void add_terms(double nu, const double* __restrict place, double first, double other,
                               const double* __restrict r, const double* __restrict weight, int count,
                               double* __restrict terms) {
+#pragma GCC ivdep
   for (int j = 0; j < count; ++j) {
     const double x = place[j] + first * place[3 * count + j];
     const double y = place[count + j] + first * place[4 * count + j] + other * place[5 * count + j];
