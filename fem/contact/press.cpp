@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -16,8 +17,9 @@ namespace {
 
 constexpr double kAsGoodAsInfinite = 100.0;  // for an infinite friction whose sets cycle
 constexpr int kBondedHalvings = 1;
-constexpr int kMostParts = 100000;   // of a step: more take minutes
-constexpr double kNoOverlap = 1e-9;  // of the thickness: an overlap of rounding is none
+constexpr int kMostParts = 100000;    // of a step: more take minutes
+constexpr double kNearerTouch = 0.5;  // of the gap before: what comes nearer by less is as near as it can be
+constexpr double kNoOverlap = 1e-9;   // of the thickness: an overlap of rounding is none
 
 using Kind = AxisControl::Kind;
 
@@ -130,11 +132,16 @@ struct Press::Parts {
 
 /// The pose straight above `pose` in which the body just touches the undeformed gel; nothing if it isn't over it.
 std::optional<RigidTransform> Press::Parts::straight_above(std::size_t body, RigidTransform pose) const {
+  double before = std::numeric_limits<double>::infinity();
   for (int k = 0; k < 30; ++k) {
     const double gap = deepest_at(body, pose);
     if (!std::isfinite(gap)) return std::nullopt;
-    pose.translation.z() -= gap;
-    if (std::abs(gap) < 1e-13 * (std::abs(pose.translation.z()) + gel.thickness)) break;
+    // An overlap is looked at more closely than a gap, on curved gels at other points: there both go to and fro for
+    // ever.
+    const bool nearer = std::abs(gap) < kNearerTouch * before;
+    if (nearer || gap < 0.0) pose.translation.z() -= gap;
+    if (!nearer || std::abs(gap) < 1e-13 * (std::abs(pose.translation.z()) + gel.thickness)) break;
+    before = std::abs(gap);
   }
   return pose;
 }
