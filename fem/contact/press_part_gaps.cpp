@@ -110,6 +110,8 @@ WeightedGap PartSolver::gap_of(std::size_t b, const Iterate& now, PartEffort& ef
   }
   const double farthest = std::sqrt(slid.rowwise().squaredNorm().maxCoeff());
   if (farthest > std::sqrt(lookup_mm_ * kSharpestCurve * size_)) return evaluate();
+  // Slopes take two evaluations, and are lost as soon as hats are cut anew.
+  if (farthest > lookup_mm_ && cached.gap.cuts) return evaluate();
   WeightedGap gap = cached.gap;
   if (farthest > lookup_mm_) {  // nearer than the lookup is known it makes no difference
     if (!cached.has_slopes) {
