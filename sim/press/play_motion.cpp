@@ -63,17 +63,18 @@ int steps_a_frame(const MotionTrack& track, const MotionSpec& motion, const Plan
 
 void play_states(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
                  const fem::GelVibration* vibration, const std::vector<std::shared_ptr<const fem::Compliance>>& elastic,
-                 const StateVisitor& visit) {
+                 const StateVisitor& visit, const std::vector<fem::ContactShape>& shapes) {
   TS_ASSERT(elastic.size() == (plan.elastic_object ? moved_objects(scene).size() : 0));
   const MotionSpec& motion = scene.motion;
   const int kept = plan.states_a_frame;
   const std::vector<MovedObject> objects = moved_objects(scene);
+  TS_ASSERT(shapes.empty() || shapes.size() == objects.size());
   const double friction = plan.friction ? scene.object.friction : 0.0;
   const fem::PronySeries relaxation = plan.relaxation ? prony_series(scene.device.gel) : fem::PronySeries{};
   std::vector<fem::PressBody> bodies;
   for (const MovedObject& moved : objects) {
     fem::PressBody body;
-    body.shape = coarse_contact_shape(moved.object, scene.device.mesh.fine_mm);
+    body.shape = shapes.empty() ? coarse_contact_shape(moved.object, scene.device.mesh.fine_mm) : shapes[bodies.size()];
     body.friction = plan.friction ? moved.object.friction : 0.0;
     if (plan.elastic_object) body.elastic = elastic[bodies.size()];
     bodies.push_back(std::move(body));
@@ -126,12 +127,13 @@ void play_states(const SceneSpec& scene, const Plan& plan, const fem::Compliance
 
 std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
                                const Progress& progress, const fem::GelVibration* vibration,
-                               const std::vector<std::shared_ptr<const fem::Compliance>>& elastic) {
+                               const std::vector<std::shared_ptr<const fem::Compliance>>& elastic,
+                               const std::vector<fem::ContactShape>& shapes) {
   const MotionSpec& motion = scene.motion;
   const ExposureTimes exposure(scene, plan);
   std::vector<Truth> truths;
   truths.reserve(motion.frame_count());
-  play_states(scene, plan, gel, vibration, elastic, [&](int frame, int part, const fem::PressState& state) {
+  const auto keep = [&](int frame, int part, const fem::PressState& state) {
     const double now_s = (frame - 1 + static_cast<double>(part) / plan.states_a_frame) / motion.frame_rate_Hz;
     exposure.keep(truths, now_s, state);
     if (part < plan.states_a_frame) return;
@@ -142,7 +144,8 @@ std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const f
     truth.error = fem::estimate_error(gel, state);
     truths.push_back(std::move(truth));
     if (progress) progress("mechanics", frame + 1, motion.frame_count());
-  });
+  };
+  play_states(scene, plan, gel, vibration, elastic, keep, shapes);
   return truths;
 }
 

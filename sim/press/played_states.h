@@ -7,6 +7,7 @@
 
 #include "fem/contact/press.h"
 #include "fem/elements/compliance.h"
+#include "fem/shapes/contact_shape.h"
 #include "fem/vibration/vibration.h"
 #include "sim/plan/plan.h"
 #include "sim/scene/scene.h"
@@ -17,9 +18,9 @@ namespace touchstone::sim {
 using StateVisitor = std::function<void(int frame, int part, const fem::PressState& state)>;
 
 /// Plays a scene's motion from its start and hands over plan.states_a_frame states a frame, in order; nothing is kept.
-/// For `vibration` and `elastic` see play_motion. @throws Error as play_motion, and what `visit` throws
+/// For `vibration`, `elastic` and `shapes` see play_motion. @throws Error as play_motion, and what `visit` throws
 void play_states(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
                  const fem::GelVibration* vibration, const std::vector<std::shared_ptr<const fem::Compliance>>& elastic,
-                 const StateVisitor& visit);
+                 const StateVisitor& visit, const std::vector<fem::ContactShape>& shapes = {});
 
 }  // namespace touchstone::sim

@@ -12,9 +12,11 @@ namespace touchstone::sim {
 namespace {
 
 constexpr double kClearance_mm = 0.05;  // above the gel at the start
-constexpr int kStepsDown = 3;           // where friction has a history
-constexpr double kDragStep_mm = 0.1;    // friction's history is stepped so finely
-constexpr int kFewestSteps = 2;         // of a drag
+// Steps where friction has a history. A first touch that force leads is taken in parts by fem itself
+// (PressTolerance::touch_parts). Finer ones change what lies under a ball sideways by 0.4 % of it, and take 1.5 times
+// as long (docs/datasets.md, "Speed").
+constexpr int kStepsDown = 3;
+constexpr double kDragStep_mm = 0.2;
 constexpr int kShearSteps = 5;
 constexpr double kMostTurn_deg = 360.0;
 
@@ -65,18 +67,20 @@ std::string in_words(const PressSpec& press) {
 }
 
 double first_touch(const PressSpec& press, const ObjectSpec& object, const GelSpec& gel) {
-  return first_touch(gel, contact_shape(object), press.place_mm,
-                     rotation_from_xyz(press.angles_deg * kRadiansPerDegree));
+  return first_touch(press, contact_shape(object), gel);
+}
+
+double first_touch(const PressSpec& press, const fem::ContactShape& shape, const GelSpec& gel) {
+  return first_touch(gel, shape, press.place_mm, rotation_from_xyz(press.angles_deg * kRadiansPerDegree));
 }
 
 MotionSpec press_motion(const PressSpec& press, double touch_mm, double friction, double frame_rate_Hz) {
   check(press);
   const bool aside = goes_aside(press);
   const bool tilted = !press.angles_deg.head<2>().isZero(0.0);
-  const int steps_down = friction > 0.0 && (aside || tilted) ? kStepsDown : 1;
+  const int steps_down = friction > 0.0 && (aside || tilted) && !press.force_N ? kStepsDown : 1;
   const int steps_aside =
-      press.shear_N ? kShearSteps
-                    : std::max(kFewestSteps, static_cast<int>(std::ceil(press.drag_mm.norm() / kDragStep_mm)));
+      press.shear_N ? kShearSteps : std::max(1, static_cast<int>(std::ceil(press.drag_mm.norm() / kDragStep_mm)));
   MotionSpec motion;
   motion.frame_rate_Hz = frame_rate_Hz;
   const double end = press.height_mm.value_or(touch_mm);

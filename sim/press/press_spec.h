@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "fem/shapes/contact_shape.h"
 #include "sim/scene/device.h"
 #include "sim/scene/motion.h"
 #include "sim/scene/object.h"
@@ -35,6 +36,8 @@ std::string in_words(const PressSpec& press);
 /// Where the object just touches the undeformed gel on the press's path down: first_touch() of the object with all its
 /// relief. @throws Error as first_touch
 double first_touch(const PressSpec& press, const ObjectSpec& object, const GelSpec& gel);
+/// The same of contact_shape(object).
+double first_touch(const PressSpec& press, const fem::ContactShape& shape, const GelSpec& gel);
 
 /// The motion of a press: from just above the gel down, then along it. Where friction has a history (the object is
 /// tilted or goes aside) both are cut into steps. `touch_mm` is what first_touch gave. @throws Error as check

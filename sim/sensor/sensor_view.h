@@ -28,6 +28,7 @@ struct SeenTouch {
 struct SeenObject {
   ObjectSpec spec;
   fem::ContactShape shape;                        ///< what the gel's mesh can see of it
+  fem::ContactShape detailed;                     ///< with all its relief
   std::string warning;                            ///< TouchObject::warning
   mutable std::mutex making;                      ///< of what follows, which a sensor's view makes at the first picture
   mutable std::shared_ptr<const SceneView> view;  ///< of coated and milky gels

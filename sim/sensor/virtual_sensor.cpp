@@ -133,10 +133,11 @@ struct VirtualSensor::Parts {
     return unseen_scene(device, settings, object, motion);
   }
 
-  std::vector<Truth> play(const ObjectSpec& object, const MotionSpec& motion) const {
-    const SceneSpec scene = mechanics_of(object, motion);
+  std::vector<Truth> play(const SeenObject& object, const MotionSpec& motion) const {
+    const SceneSpec scene = mechanics_of(object.spec, motion);
     const Plan plan = make_plan(scene);
-    return play_motion(scene, plan, *gel, {}, nullptr, set_up_elastic_objects(scene, plan, cache_folder));
+    return play_motion(scene, plan, *gel, {}, nullptr, set_up_elastic_objects(scene, plan, cache_folder),
+                       {object.shape});
   }
 
   /// `imager`: as controlled().
@@ -152,11 +153,11 @@ struct VirtualSensor::Parts {
   bool has_events() const { return device.camera && device.camera->events; }
   bool has_chip() const { return device.camera && device.camera->motion_chip; }
 
-  MotionSpec motion_of(const ObjectSpec& object, const PressSpec& press) const {
+  MotionSpec motion_of(const SeenObject& object, const PressSpec& press) const {
     check(press);
     const double touch = touch_of(object, press);
     const double rate = device.camera ? device.camera->frame_rate_Hz : kFrameRate_Hz;
-    MotionSpec motion = press_motion(press, touch, object.friction, rate);
+    MotionSpec motion = press_motion(press, touch, object.spec.friction, rate);
     if (has_events()) {
       int most = kEventSteps;
       for (const MotionKey& key : motion.keys) most = std::max(most, key.frames);
@@ -167,10 +168,10 @@ struct VirtualSensor::Parts {
   }
 
   /// A height may also be one where the object isn't over the gel: then it's led straight there.
-  double touch_of(const ObjectSpec& object, const PressSpec& press) const {
-    if (!press.height_mm) return first_touch(press, object, device.gel);
+  double touch_of(const SeenObject& object, const PressSpec& press) const {
+    if (!press.height_mm) return first_touch(press, object.detailed, device.gel);
     try {
-      return first_touch(press, object, device.gel);
+      return first_touch(press, object.detailed, device.gel);
     } catch (const Error&) {
       return *press.height_mm;
     }
@@ -296,6 +297,7 @@ TouchObject VirtualSensor::object(const ObjectSpec& spec) const {
   auto seen = std::make_shared<SeenObject>();
   seen->spec = spec;
   seen->shape = coarse_contact_shape(spec, parts_->device.mesh.fine_mm);
+  seen->detailed = contact_shape(spec);
   check_shape(seen->shape);
   seen->warning = size_doubt(parts_->device, spec);
   TouchObject object;
@@ -304,11 +306,11 @@ TouchObject VirtualSensor::object(const ObjectSpec& spec) const {
 }
 
 MotionSpec VirtualSensor::motion_of(const TouchObject& object, const PressSpec& press) const {
-  return parts_->motion_of(object.spec(), press);
+  return parts_->motion_of(*object.seen_, press);
 }
 
 std::vector<Truth> VirtualSensor::play(const TouchObject& object, const MotionSpec& motion) const {
-  return parts_->play(object.spec(), motion);
+  return parts_->play(*object.seen_, motion);
 }
 
 TouchSession VirtualSensor::session(const TouchObject& object, const TouchSessionSettings& settings) const {
