@@ -22,16 +22,19 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kLongestWatch_s = 100.0;   // event pixels fire without end, even if nothing moves
-constexpr double kLongestShear_mm = 100.0;  // friction's history is stepped in tenths of a mm
+constexpr double kLongestShear_mm = 100.0;  // friction's history is stepped in fifths of a mm
 
 /// The file of this name, or the shipped one: "gelsight-flat" is scenes/devices/gelsight-flat.yaml.
 fs::path named_file(const std::string& name, const char* folder) {
   const fs::path given(checked_path(name, folder));
   std::error_code ignored;
-  if (given.has_extension() || given.has_parent_path() || fs::exists(given, ignored)) return given;
+  if (given.has_parent_path() || fs::exists(given, ignored)) return given;
   const fs::path shipped = datasets::scenes_folder() / folder;
   const fs::path file = shipped / (name + ".yaml");
   if (fs::exists(file, ignored)) return file;
+  // "ball.yaml" is a file that isn't there; "cylinder-8.4mm" a name.
+  const std::string extension = given.extension().string();
+  if (extension.size() > 1 && !(extension[1] >= '0' && extension[1] <= '9')) return given;
   std::vector<std::string> known;
   for (const auto& entry : fs::directory_iterator(shipped, ignored)) {
     if (entry.path().extension() == ".yaml") known.push_back(entry.path().stem().string());

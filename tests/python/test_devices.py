@@ -29,6 +29,15 @@ def test_their_number():
     assert len(DEVICES) == 17 and QUICK < set(DEVICES)
 
 
+def test_names_of_shipped_objects():
+    for path in (SCENES / "objects").glob("*.yaml"):
+        assert ts.Object(path.stem).name == ts.Object(path).name  # "cylinder-8.5mm" has no ending
+    with pytest.raises(ts.Error, match="cylinder-8.4mm.*did you mean 'cylinder-8.5mm'"):
+        ts.Object("cylinder-8.4mm")
+    with pytest.raises(ts.Error, match="ball.yaml: can't be read"):
+        ts.Object("ball.yaml")
+
+
 def test_a_ball_makes_a_frame_with_its_force(touched):
     name, sensor, touch = touched
     assert touch.frame.shape[:2] == sensor.picture_shape and touch.frame.dtype == np.uint8
