@@ -177,8 +177,8 @@ ResultTable coated_time_table(const LightOptions& options) {
   ResultTable table;
   table.name = "light-coated-time";
   table.title = "What a labelled picture of a coated device takes";
-  table.columns = {"device", "pressed by", "press, ms",     "contact, ms",    "light, ms", "imager, ms", "truth, ms",
-                   "sum, ms", "clock, ms",  "clock on all threads, ms"};
+  table.columns = {"device",     "pressed by", "press, ms", "contact, ms", "light, ms",
+                   "imager, ms", "truth, ms",  "sum, ms",   "clock, ms",   "clock on all threads, ms"};
   for (const char* name :
        {"gelsight-flat", "gelsight-markers", "gelsight-portable", "gelsight-dome", "gelsight-mini"}) {
     const std::string scenes = std::string(TOUCHSTONE_SOURCE_DIR) + "/scenes";
@@ -189,8 +189,8 @@ ResultTable coated_time_table(const LightOptions& options) {
       const PictureTimes times = times_of(sensor, settings, object, force_N, options.quick ? 3 : 10);
       const double sum = times.press + times.contact + times.light + times.imager + times.truth;
       std::vector<std::string> row = {name, fmt::format("{}, {} N", pressed, force_N)};
-      for (const double seconds : {times.press, times.contact, times.light, times.imager, times.truth, sum, times.clock,
-                                   times.clock_all}) {
+      for (const double seconds :
+           {times.press, times.contact, times.light, times.imager, times.truth, sum, times.clock, times.clock_all}) {
         row.push_back(fmt::format("{:.1f}", 1e3 * seconds));
       }
       table.rows.push_back(std::move(row));

@@ -13,9 +13,9 @@ int main(int argc, char** argv) {
   using namespace touchstone;
   using namespace touchstone::bench;
   const std::vector<std::pair<std::string, ResultTable (*)(const LightOptions&)>> tables = {
-      {"rays", bare_rays_table},        {"error", light_error_table},        {"frames", direct_frames_table},
-      {"blur", hole_blur_table},        {"gelsight", gelsight_frames_table}, {"growth", light_growth_table},
-      {"effects", light_effects_table}, {"devices", device_frames_table},    {"coated", coated_error_table},
+      {"rays", bare_rays_table},         {"error", light_error_table},        {"frames", direct_frames_table},
+      {"blur", hole_blur_table},         {"gelsight", gelsight_frames_table}, {"growth", light_growth_table},
+      {"effects", light_effects_table},  {"devices", device_frames_table},    {"coated", coated_error_table},
       {"coated-time", coated_time_table}};
   std::vector<std::string> names;
   for (const auto& [name, make] : tables) names.push_back(name);
