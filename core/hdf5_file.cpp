@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/isolated_call.h"
 
 namespace touchstone {
 namespace {
@@ -21,6 +22,7 @@ constexpr std::size_t kMemoryStep = 4 << 20;
 constexpr std::size_t kMostTextBytes = 1 << 24;  // of an attribute
 constexpr unsigned kDeflateLevel = 4;            // of 9; higher ones cost time and win a percent
 constexpr int kPackedLevel = 1;                  // of pictures with noise, which hardly pack
+constexpr int kTrialSeconds = 60;
 
 static_assert(std::is_same_v<hid_t, Hdf5Id> || sizeof(hid_t) == sizeof(Hdf5Id));
 
@@ -592,6 +594,26 @@ std::int64_t Hdf5Reader::integer_attribute(const std::string& path, const std::s
     fail("{}: '{}' has no whole number '{}'", name_, path, name);
   }
   return value;
+}
+
+void try_hdf5(const std::filesystem::path& file, const std::function<void()>& read) {
+  const auto held = hold();
+  std::string fault;
+  try {
+    fault = isolated_call(
+        [&read]() -> std::string {
+          try {
+            read();
+          } catch (const Error& error) {
+            return error.what();
+          }
+          return {};
+        },
+        kTrialSeconds, kTrialSeconds);
+  } catch (const Error& error) {
+    fail("{}: is damaged (HDF5 failed to read it: {})", file.string(), error.what());
+  }
+  if (!fault.empty()) throw Error(fault);
 }
 
 }  // namespace touchstone

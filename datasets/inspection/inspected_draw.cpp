@@ -188,7 +188,10 @@ void read_drawn_samples(const Manifest& manifest, InspectedSet& set) {
   }
   std::vector<std::array<std::int64_t, 3>> splits(set.scenes.size(), {0, 0, 0});
   std::vector<std::set<std::string>> objects(set.scenes.size());
-  for (const ManifestBlock& block : set.blocks) read_block(block, set, splits, objects);
+  for (const ManifestBlock& block : set.blocks) {
+    try_hdf5(set.folder / block.name, [&] { read_block(block, set, splits, objects); });
+    read_block(block, set, splits, objects);
+  }
   for (std::size_t k = 0; k < set.scenes.size(); ++k) {
     for (std::size_t s = 0; s < splits[k].size(); ++s) {
       if (splits[k][s] == 0) continue;

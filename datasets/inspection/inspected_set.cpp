@@ -75,10 +75,15 @@ std::vector<double> column(const Hdf5Reader& file, const std::filesystem::path& 
 
 void read_columns(const std::filesystem::path& path, InspectedSet& set) {
   const TruthTable table = read_truth_table(path);
-  const Hdf5Reader file(path);
   const std::size_t count = table.t_us.size();
-  const auto displacement_error = column(file, path, "/error/displacement_mm", 1, count);
-  set.samples = read_sample_columns(file, path, "/error/force_N", count);
+  std::vector<double> displacement_error;
+  const auto read = [&] {
+    const Hdf5Reader file(path);
+    displacement_error = column(file, path, "/error/displacement_mm", 1, count);
+    set.samples = read_sample_columns(file, path, "/error/force_N", count);
+  };
+  try_hdf5(path, read);
+  read();
   for (std::size_t i = 0; i < count; ++i) {
     set.samples[i].scene = table.scene[i];
     set.samples[i].frame = table.frame[i];

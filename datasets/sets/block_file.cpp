@@ -257,6 +257,41 @@ std::vector<T> column(const Hdf5Reader& file, const std::string& path, std::int6
   return std::move(array.values);
 }
 
+BlockColumns columns_in(const fs::path& path, std::int64_t n) {
+  const Hdf5Reader file(path);
+  BlockColumns columns;
+  try {
+    columns.sample = column<std::int64_t>(file, "/sample", n);
+    columns.unit = column<std::int32_t>(file, "/unit", n);
+    columns.object = column<std::int32_t>(file, "/object", n);
+    columns.split = column<std::int32_t>(file, "/split", n);
+    columns.attempt = column<std::int32_t>(file, "/attempt", n);
+    columns.deepest_mm = column<double>(file, "/deepest_mm", n);
+    columns.contact_area_mm2 = column<double>(file, "/contact_area_mm2", n);
+    columns.largest_strain = column<double>(file, "/largest_strain", n);
+    columns.place_x_mm = column<double>(file, "/drawn/place_x_mm", n);
+    columns.place_y_mm = column<double>(file, "/drawn/place_y_mm", n);
+    columns.turn_deg = column<double>(file, "/drawn/turn_deg", n);
+    columns.tilt_deg = column<double>(file, "/drawn/tilt_deg", n);
+    columns.drag_mm = column<double>(file, "/drawn/drag_mm", n);
+    for (const std::int32_t one : column<std::int32_t>(file, "/under_resolved", n)) columns.under_resolved += one;
+    const std::vector<double> wrench = file.read<double>("/wrench").values;
+    const std::vector<double> error = file.read<double>("/wrench_error").values;
+    if (wrench.size() != static_cast<std::size_t>(6 * n) || error.size() != static_cast<std::size_t>(3 * n)) {
+      fail("array '/wrench' has another shape than it should");
+    }
+    for (std::size_t i = 0; i < static_cast<std::size_t>(n); ++i) {
+      columns.force_N.push_back(wrench[6 * i + 2]);
+      columns.shear_N.push_back(std::hypot(wrench[6 * i], wrench[6 * i + 1]));
+      columns.force_error_N.push_back(error[3 * i + 2]);
+    }
+    columns.light = file.text_attribute("/", "light");
+  } catch (const Error& error) {
+    fail("{}: {}", path.string(), error.what());
+  }
+  return columns;
+}
+
 }  // namespace
 
 std::string block_name(const DrawnBlock& block) {
@@ -319,39 +354,8 @@ BlockState state_of_block(const fs::path& out, const std::string& identity, cons
 
 BlockColumns read_block_columns(const fs::path& out, const DrawnBlock& block) {
   const fs::path path = out / block_name(block);
-  const Hdf5Reader file(path);
-  BlockColumns columns;
-  const std::int64_t n = block.samples;
-  try {
-    columns.sample = column<std::int64_t>(file, "/sample", n);
-    columns.unit = column<std::int32_t>(file, "/unit", n);
-    columns.object = column<std::int32_t>(file, "/object", n);
-    columns.split = column<std::int32_t>(file, "/split", n);
-    columns.attempt = column<std::int32_t>(file, "/attempt", n);
-    columns.deepest_mm = column<double>(file, "/deepest_mm", n);
-    columns.contact_area_mm2 = column<double>(file, "/contact_area_mm2", n);
-    columns.largest_strain = column<double>(file, "/largest_strain", n);
-    columns.place_x_mm = column<double>(file, "/drawn/place_x_mm", n);
-    columns.place_y_mm = column<double>(file, "/drawn/place_y_mm", n);
-    columns.turn_deg = column<double>(file, "/drawn/turn_deg", n);
-    columns.tilt_deg = column<double>(file, "/drawn/tilt_deg", n);
-    columns.drag_mm = column<double>(file, "/drawn/drag_mm", n);
-    for (const std::int32_t one : column<std::int32_t>(file, "/under_resolved", n)) columns.under_resolved += one;
-    const std::vector<double> wrench = file.read<double>("/wrench").values;
-    const std::vector<double> error = file.read<double>("/wrench_error").values;
-    if (wrench.size() != static_cast<std::size_t>(6 * n) || error.size() != static_cast<std::size_t>(3 * n)) {
-      fail("array '/wrench' has another shape than it should");
-    }
-    for (std::size_t i = 0; i < static_cast<std::size_t>(n); ++i) {
-      columns.force_N.push_back(wrench[6 * i + 2]);
-      columns.shear_N.push_back(std::hypot(wrench[6 * i], wrench[6 * i + 1]));
-      columns.force_error_N.push_back(error[3 * i + 2]);
-    }
-    columns.light = file.text_attribute("/", "light");
-  } catch (const Error& error) {
-    fail("{}: {}", path.string(), error.what());
-  }
-  return columns;
+  try_hdf5(path, [&] { columns_in(path, block.samples); });
+  return columns_in(path, block.samples);
 }
 
 }  // namespace touchstone::datasets

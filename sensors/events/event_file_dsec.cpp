@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "core/error.h"
-#include "core/isolated_call.h"
 
 namespace touchstone::sensors {
 namespace {
@@ -16,31 +15,16 @@ constexpr std::int64_t kLargestSide = 65536;
 constexpr std::int64_t kMostUs = std::numeric_limits<std::uint32_t>::max();
 constexpr std::int64_t kMs = 1000;
 constexpr std::array kColumns{"/events/t", "/events/x", "/events/y", "/events/p"};
-constexpr int kProbeSeconds = 60;
 
-/// HDF5 1.10 ends the process on some damaged files of the older layouts (5 of 6000 with 1 to 4 flipped bits), which
-/// have no checksums, so they're tried in a process of their own first.
 std::filesystem::path probed(const std::filesystem::path& file) {
-  const auto probe = [&file]() -> std::string {
-    try {
-      const Hdf5Reader reader(file);
-      if (reader.has_attribute("/", "format")) reader.text_attribute("/", "format");
-      for (const char* column : kColumns) {
-        if (reader.has(column)) reader.walk_list(column);
-      }
-      if (reader.has("/t_offset")) reader.read_number("/t_offset");
-    } catch (const Error& error) {
-      return error.what();
+  try_hdf5(file, [&file] {
+    const Hdf5Reader reader(file);
+    if (reader.has_attribute("/", "format")) reader.text_attribute("/", "format");
+    for (const char* column : kColumns) {
+      if (reader.has(column)) reader.walk_list(column);
     }
-    return {};
-  };
-  std::string fault;
-  try {
-    fault = isolated_call(probe, kProbeSeconds, kProbeSeconds);
-  } catch (const Error& error) {
-    fail("{}: is damaged: HDF5 {}", file.string(), error.what());
-  }
-  if (!fault.empty()) throw Error(fault);
+    if (reader.has("/t_offset")) reader.read_number("/t_offset");
+  });
   return file;
 }
 

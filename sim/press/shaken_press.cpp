@@ -70,7 +70,7 @@ void ShakenPress::Parts::refuse_unless_it_holds(const fem::PressState& mean, con
 
 ShakenPress::ShakenPress(const fem::Compliance& gel, const fem::GelVibration& vibration, fem::PronySeries relaxation,
                          double friction)
-    : parts_(new Parts{gel, vibration, std::move(relaxation), friction, {}, {}, {}}) {
+    : parts_(new Parts{gel, vibration, std::move(relaxation), friction, {}, {}, {}, {}}) {
   parts_->mass.compute(gel.mass);
   if (parts_->mass.info() != Eigen::Success) fail("the gel's surface mass matrix isn't positive definite");
 }

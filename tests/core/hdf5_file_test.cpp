@@ -2,10 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <thread>
 
 #include "core/error.h"
 #include "core/whole_file.h"
+#include "tests/support/message_of.h"
 #include "tests/support/temporary_folder.h"
 
 namespace touchstone {
@@ -141,6 +143,18 @@ TEST(Hdf5File, ABrokenOffFileIsRefused) {
 
 TEST(Hdf5File, AFolderThatIsntThereIsAnError) {
   EXPECT_THROW(write_file("/nonexistent/a.h5"), Error);
+}
+
+TEST(Hdf5Trial, WhatEndsTheProcessIsAnErrorThatNamesTheFile) {
+  EXPECT_EQ(test::message_of([] { try_hdf5("a.h5", [] { std::abort(); }); }),
+            "a.h5: is damaged (HDF5 failed to read it: it was ended by signal 6)");
+}
+
+TEST(Hdf5Trial, AnErrorComesAsItIsAndNothingOfASuccess) {
+  EXPECT_EQ(test::message_of([] { try_hdf5("a.h5", [] { throw Error("wrong"); }); }), "wrong");
+  bool read = false;
+  try_hdf5("a.h5", [&read] { read = true; });
+  EXPECT_FALSE(read);
 }
 
 }  // namespace

@@ -12,6 +12,13 @@ extern "C" const char* __lsan_default_suppressions() {
   return "leak:libhdf5\n";
 }
 
+/// HDF5 asks malloc for as much as a damaged length says, gets nothing, and refuses the file. AddressSanitizer would
+/// end the process there. What we ask for ourselves, by new, still does: that is a find.
+extern "C" const char* __asan_default_options();
+extern "C" const char* __asan_default_options() {
+  return "allocator_may_return_null=1:max_allocation_size_mb=1400";
+}
+
 namespace touchstone::fuzz {
 
 bool reads(std::string_view bytes) {
@@ -19,6 +26,7 @@ bool reads(std::string_view bytes) {
   const auto file = scratch_file(bytes, datasets::block_name(block));
   const auto out = file.parent_path().parent_path();
   datasets::state_of_block(out, "run", block);
+  if (bytes.find("\x89HDF\r\n\x1a\n") == std::string_view::npos) return false;  // two processes for nothing
   const bool columns = gives_result([&] { datasets::read_block_columns(out, block); });
   const bool truth = gives_result([&] {
     const datasets::TruthTable table = datasets::read_truth_table(file);

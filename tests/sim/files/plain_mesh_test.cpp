@@ -230,7 +230,9 @@ TEST_F(PlainMesh, PlyHeadersThatSayTooMuchOrTooLittleAreRefused) {
   }
   EXPECT_THAT(error_of(replaced(text, "end_header", "header"), ".ply"), HasSubstr("no line 'end_header'"));
   EXPECT_THAT(error_of("a letter\nend_header\n", ".ply"), HasSubstr("doesn't begin with 'ply'"));
+#ifndef __SANITIZE_ADDRESS__  // whose operator new ends the process that reads the file, and doesn't throw
   EXPECT_THAT(error_of(replaced(text, "vertex 8", "vertex 4000000000"), ".ply"), HasSubstr("holds more than it can"));
+#endif
   EXPECT_THAT(error_of(replaced(text, "\n3 ", "\n400000000 "), ".ply"), HasSubstr("isn't a readable PLY file"));
   const std::size_t last = text.rfind("\n3 ");
   EXPECT_THAT(error_of(text.substr(0, last) + "\n3 1 7 99\n", ".ply"), HasSubstr("names vertex 99, but there are 8"));
