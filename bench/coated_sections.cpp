@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,6 +31,14 @@ struct PressedObject {
 };
 constexpr PressedObject kPresses[] = {
     {"ball-8mm", 1.0}, {"coin-penny", 2.0}, {"fingerprint", 1.0}, {"usb-a-plug", 2.0}};
+
+constexpr const char* kDevices[] = {"gelsight-flat", "gelsight-markers", "gelsight-portable", "gelsight-dome",
+                                    "gelsight-mini"};
+
+/// "devices/gelsight-flat" among the shipped files.
+std::string shipped(const std::string& name) {
+  return std::string(TOUCHSTONE_SOURCE_DIR) + "/scenes/" + name + ".yaml";
+}
 
 /// Each pixel of one column in `apart` and of one row in `apart`.
 cv::Mat raster_of_pixels(const cv::Size& size, int apart) {
@@ -62,33 +69,29 @@ PictureTimes times_of(const sim::VirtualSensor& sensor, const sim::VirtualSensor
     return press;
   };
   sensor.press(seen, press_of(0));  // what all touches share is made here
-  const auto mean_of = [&](auto&& work) {
-    const ProcessorStopwatch used;
+  const auto mean_of = [&](const auto& watch, const auto& work) {
     for (int k = 1; k <= repeats; ++k) work(k);
-    return used.seconds() / repeats;
+    return watch.seconds() / repeats;
   };
+  const auto press = [&](int k) { sensor.press(seen, press_of(k)); };
   PictureTimes times;
   {
     const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
     std::vector<fem::PressState> states(static_cast<std::size_t>(repeats) + 1);
-    times.press = mean_of([&](int k) {
+    times.press = mean_of(ProcessorStopwatch(), [&](int k) {
       states[static_cast<std::size_t>(k)] = sensor.play(seen, sensor.motion_of(seen, press_of(k))).back().press;
     });
     const auto state = [&](int k) -> const fem::PressState& { return states[static_cast<std::size_t>(k)]; };
-    times.contact = mean_of([&](int k) { view.relief(state(k)); });
-    const double frame = mean_of([&](int k) { sensor.capture(seen, state(k), 1, k, false); });
-    const double all = mean_of([&](int k) { sensor.capture(seen, state(k), 1, k, true); });
+    times.contact = mean_of(ProcessorStopwatch(), [&](int k) { view.relief(state(k)); });
+    const double frame = mean_of(ProcessorStopwatch(), [&](int k) { sensor.capture(seen, state(k), 1, k, false); });
+    const double all = mean_of(ProcessorStopwatch(), [&](int k) { sensor.capture(seen, state(k), 1, k, true); });
     const sim::Touch touch = sensor.press(seen, press_of(1));
-    times.imager = mean_of([&](int k) { touch.expose(static_cast<std::uint64_t>(k)); });
+    times.imager = mean_of(ProcessorStopwatch(), [&](int k) { touch.expose(static_cast<std::uint64_t>(k)); });
     times.light = frame - times.contact - times.imager;
     times.truth = all - frame;
-    const Stopwatch clock;
-    for (int k = 1; k <= repeats; ++k) sensor.press(seen, press_of(k));
-    times.clock = clock.seconds() / repeats;
+    times.clock = mean_of(Stopwatch(), press);
   }
-  const Stopwatch clock;
-  for (int k = 1; k <= repeats; ++k) sensor.press(seen, press_of(k));
-  times.clock_all = clock.seconds() / repeats;
+  times.clock_all = mean_of(Stopwatch(), press);
   return times;
 }
 
@@ -135,17 +138,15 @@ ResultTable coated_error_table(const LightOptions& options) {
   table.columns = {"device", "pressed by", "% RMS", "its mean, %", "in the imager's noises"};
   const int apart = options.quick ? 8 : 5;
   const int samples = options.quick ? 64 : 256;
-  for (const char* name :
-       {"gelsight-flat", "gelsight-markers", "gelsight-portable", "gelsight-dome", "gelsight-mini"}) {
-    const std::string scenes = std::string(TOUCHSTONE_SOURCE_DIR) + "/scenes";
-    sim::DeviceSpec device = sim::read_device(scenes + "/devices/" + name + ".yaml");
+  for (const std::string name : kDevices) {
+    sim::DeviceSpec device = sim::read_device(shipped("devices/" + name));
     device.background = cv::Mat();  // the model's own light, not the real unit's
     device.residual = {};
     const sim::VirtualSensorSettings settings;
     const sim::VirtualSensor sensor(device, options.cache, settings);
     const render::Camera camera = sim::camera_of(*device.camera);
     for (const auto& [pressed, force_N] : kPresses) {
-      const sim::ObjectSpec object = sim::read_object(scenes + "/objects/" + pressed + ".yaml");
+      const sim::ObjectSpec object = sim::read_object(shipped(std::string("objects/") + pressed));
       const sim::TouchObject seen = sensor.object(object);
       sim::PressSpec press;
       press.force_N = force_N;
@@ -176,17 +177,16 @@ ResultTable coated_error_table(const LightOptions& options) {
 ResultTable coated_time_table(const LightOptions& options) {
   ResultTable table;
   table.name = "light-coated-time";
+  const int repeats = options.quick ? 3 : 10;
   table.title = "What a labelled picture of a coated device takes";
   table.columns = {"device",     "pressed by", "press, ms", "contact, ms", "light, ms",
                    "imager, ms", "truth, ms",  "sum, ms",   "clock, ms",   "clock on all threads, ms"};
-  for (const char* name :
-       {"gelsight-flat", "gelsight-markers", "gelsight-portable", "gelsight-dome", "gelsight-mini"}) {
-    const std::string scenes = std::string(TOUCHSTONE_SOURCE_DIR) + "/scenes";
+  for (const std::string name : kDevices) {
     const sim::VirtualSensorSettings settings;
-    const sim::VirtualSensor sensor(sim::read_device(scenes + "/devices/" + name + ".yaml"), options.cache, settings);
+    const sim::VirtualSensor sensor(sim::read_device(shipped("devices/" + name)), options.cache, settings);
     for (const auto& [pressed, force_N] : kPresses) {
-      const sim::ObjectSpec object = sim::read_object(scenes + "/objects/" + pressed + ".yaml");
-      const PictureTimes times = times_of(sensor, settings, object, force_N, options.quick ? 3 : 10);
+      const sim::ObjectSpec object = sim::read_object(shipped(std::string("objects/") + pressed));
+      const PictureTimes times = times_of(sensor, settings, object, force_N, repeats);
       const double sum = times.press + times.contact + times.light + times.imager + times.truth;
       std::vector<std::string> row = {name, fmt::format("{}, {} N", pressed, force_N)};
       for (const double seconds :
@@ -200,8 +200,7 @@ ResultTable coated_time_table(const LightOptions& options) {
       "Processor time of one thread, the mean of {} presses whose forces differ by {} %. Contact: the fine contact "
       "under the coarse press. Truth: heights and contact of each pixel. The last two columns are the clock's, on one "
       "thread and on all {}.",
-      options.quick ? 3 : 10, 100 * kForceStep,
-      tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism))};
+      repeats, 100 * kForceStep, tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism))};
   return table;
 }
 
