@@ -69,7 +69,7 @@ Background mean_background(std::span<const cv::Mat> frames) {
   return background;
 }
 
-cv::Mat difference_to(const Background& background, const cv::Mat& frame, const cv::Vec3d& gain) {
+cv::Mat difference_to(const Background& background, const cv::Mat& frame, const cv::Vec3d& gain, double ceiling_DN) {
   TS_ASSERT(background.mean.type() == CV_32FC3);
   const std::string fault = frame_fault(frame, background.mean.size());
   if (!fault.empty()) fail("the frame {}", fault);
@@ -78,7 +78,15 @@ cv::Mat difference_to(const Background& background, const cv::Mat& frame, const 
   if (gain != cv::Vec3d(1.0, 1.0, 1.0)) {
     cv::multiply(difference, cv::Scalar(1.0 / gain[0], 1.0 / gain[1], 1.0 / gain[2]), difference);
   }
-  difference -= background.mean;
+  if (!std::isfinite(ceiling_DN)) {
+    difference -= background.mean;
+    return difference;
+  }
+  const cv::Scalar ceiling = cv::Scalar::all(ceiling_DN);
+  cv::Mat rest;
+  cv::min(difference, ceiling, difference);
+  cv::min(background.mean, ceiling, rest);
+  difference -= rest;
   return difference;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 // The picture of the untouched gel, which every frame is held against [Li2015, sec. 2.2.2, step 1].
 
+#include <limits>
 #include <opencv2/core/mat.hpp>
 #include <optional>
 #include <span>
@@ -24,8 +25,10 @@ std::string frame_fault(const cv::Mat& frame, const cv::Size& size);
 Background mean_background(std::span<const cv::Mat> frames);
 
 /// frame / gain - background with its sign, CV_32FC3. `gain` is what the frame's channels are stronger by
-/// (frame_gain.h). @throws Error naming what makes the frame unfit
-cv::Mat difference_to(const Background& background, const cv::Mat& frame, const cv::Vec3d& gain = {1.0, 1.0, 1.0});
+/// (frame_gain.h). What is above `ceiling_DN` of the background's numbers counts as the ceiling, in both.
+/// @throws Error naming what makes the frame unfit
+cv::Mat difference_to(const Background& background, const cv::Mat& frame, const cv::Vec3d& gain = {1.0, 1.0, 1.0},
+                      double ceiling_DN = std::numeric_limits<double>::infinity());
 
 /// The share of pixels with a channel at 255.
 double saturated_share(const cv::Mat& frame);

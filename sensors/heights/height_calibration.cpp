@@ -204,8 +204,15 @@ std::vector<LabelledPicture> labelled_pictures(const std::vector<UsedPress>& use
   std::vector<LabelledPicture> pictures;
   for (std::size_t i = 0; i < used.size(); ++i) {
     const BallPress& press = *used[i].press;
-    pictures.push_back({used[i].seen.difference, press.frame, circles[i], press.ball_radius_mm});
-    if (!white_balance) continue;
+    if (!white_balance) {
+      pictures.push_back({used[i].seen.difference, press.frame, circles[i], press.ball_radius_mm});
+      continue;
+    }
+    const auto add = [&](const cv::Mat& frame) {
+      cv::Mat difference = difference_to(background, frame, finder.find(frame).gain, SlopeNetwork::kCeiling_DN);
+      pictures.push_back({std::move(difference), frame, circles[i], press.ball_radius_mm});
+    };
+    add(press.frame);
     RandomStream random(settings.learning.seed, i, Purpose::kSearch);
     for (int balance = 0; balance < kBalances; ++balance) {
       cv::Scalar factors;
@@ -214,8 +221,7 @@ std::vector<LabelledPicture> labelled_pictures(const std::vector<UsedPress>& use
       }
       cv::Mat other;
       cv::multiply(press.frame, factors, other);
-      const cv::Mat difference = difference_to(background, other, finder.find(other).gain);
-      pictures.push_back({difference, other, circles[i], press.ball_radius_mm});
+      add(other);
     }
   }
   pictures.push_back({cv::Mat::zeros(background.mean.size(), CV_32FC3), {}, {}, 0.0});
@@ -237,7 +243,7 @@ double network_left_out_error(const std::vector<UsedPress>& used, const std::vec
     cv::Mat slope_u;
     cv::Mat slope_v;
     for (std::size_t i = fold; i < used.size(); i += kFolds) {
-      reader.read(used[i].seen.difference, slope_u, slope_v);
+      reader.read(pictures[i * copies].difference, slope_u, slope_v);
       for (const ColourSample& sample : used[i].samples) {
         const auto u = static_cast<int>(sample.place.x());
         const auto v = static_cast<int>(sample.place.y());

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <opencv2/core.hpp>
 
 #include "core/error.h"
@@ -233,7 +234,8 @@ void HeightEstimator::find_slopes(const cv::Mat& frame) {
     look_up_slopes(frame);
     return;
   }
-  reader_->read(difference_to(model_.background, frame, result_.gain), result_.slope_u, result_.slope_v);
+  const double ceiling = gains_ ? SlopeNetwork::kCeiling_DN : std::numeric_limits<double>::infinity();
+  reader_->read(difference_to(model_.background, frame, result_.gain, ceiling), result_.slope_u, result_.slope_v);
 }
 
 const HeightResult& HeightEstimator::estimate(const cv::Mat& frame) {

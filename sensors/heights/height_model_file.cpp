@@ -12,9 +12,9 @@ namespace touchstone::sensors {
 namespace {
 
 constexpr const char* kFormat = "touchstone.height_model";
-// 4: a network sees to its pixel's sides; 3 had means round it only; 2 had no network and no white balance; 1 had a
-// polynomial for lamps.
-constexpr int kVersion = 4;
+// 5: a network takes what is above a ceiling for the ceiling; 4: a network sees to its pixel's sides; 3 had means round
+// it only; 2 had no network and no white balance; 1 had a polynomial for lamps.
+constexpr int kVersion = 5;
 constexpr int kLargestSide = 8192;
 constexpr int kMostCells = 1024;
 

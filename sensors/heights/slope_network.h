@@ -40,6 +40,10 @@ struct SlopeNetwork {
   static constexpr int kNear = 8;  ///< inputs of the pixel, its fine neighbourhood and its place
   static constexpr int kInputs = kNear + 3 * static_cast<int>(kContext.size());
   static constexpr double kColourUnit_DN = 64.0;
+  /// Where the camera sets its white balance, numbers above this count as this, once the frame's gain is taken out:
+  /// those are what 20 % more of a channel cuts off. Of 190 to 255, chosen on the same 20 presses
+  /// (docs/sensors/gelsight.md).
+  static constexpr double kCeiling_DN = 208.0;
 };
 
 /// What is wrong with a network, or the empty string.
