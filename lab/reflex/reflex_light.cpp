@@ -109,8 +109,8 @@ struct ReflexLight::Parts {
   }
 
   render::Scene seen(const sim::GelSheet& skin) const {
-    render::Scene out = sim::scene_without_surface(scene, plan, {}, {}, fem::PressState{});
-    out.surfaces.insert(out.surfaces.begin(), sim::coated_surface(scene.device, plan.bands, skin));
+    render::Scene out = sim::scene_in_coating(scene, plan, fem::PressState{});
+    out.surfaces.insert(out.surfaces.begin(), sim::coated_surface(scene, plan, skin));
     for (render::Surface& surface : out.surfaces) make_black(surface);
     return out;
   }

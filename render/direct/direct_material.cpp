@@ -28,15 +28,20 @@ DirectPrint::DirectPrint(const Surface& surface)
     : material_mm(&surface.print->material_mm),
       triangles(&surface.mesh.triangles),
       index(surface.print->marks),
-      picture(surface.print->picture.get()) {
-  for (const PrintedMark& mark : surface.print->marks) {
-    const Spectrum& ink = surface.print->inks[mark.ink];
-    auto& colour = mark_colours.emplace_back();
+      picture(surface.print->picture.get()),
+      ground(&surface.print->ground),
+      inked(!surface.print->marks.empty() || surface.print->picture) {
+  for (const Spectrum& ink : surface.print->inks) {
+    auto& colour = ink_colours.emplace_back();
     for (Eigen::Index band = 0; band < ink.size(); ++band) colour[band] = static_cast<float>(ink[band]);
   }
+  for (const PrintedMark& mark : surface.print->marks) mark_colours.push_back(ink_colours[mark.ink]);
 }
 
-const float* DirectPrint::colour_at(int triangle, float u, float v, const float* plain) const {
+const float* DirectPrint::colour_at(int triangle, float u, float v, const float* own) const {
+  const int under = ground->empty() ? -1 : (*ground)[triangle];
+  const float* const plain = under < 0 ? own : ink_colours[under].data();
+  if (!inked) return plain;
   const auto& t = (*triangles)[triangle];
   const std::vector<Eigen::Vector2d>& at = *material_mm;
   const Eigen::Vector2d point = (1.0 - double(u) - double(v)) * at[t[0]] + double(u) * at[t[1]] + double(v) * at[t[2]];

@@ -28,12 +28,15 @@ struct DirectPrint {
   PrintIndex index;
   std::vector<std::array<float, kMaxBands>> mark_colours;
   const PrintedPicture* picture = nullptr;
+  const std::vector<int>* ground = nullptr;
+  std::vector<std::array<float, kMaxBands>> ink_colours;  ///< of the ground
+  bool inked = false;                                     ///< is there anything over the ground?
 
   /// @pre the surface has a print
   explicit DirectPrint(const Surface& surface);
 
-  /// The ink at a place of a triangle, or `plain` where there is none.
-  const float* colour_at(int triangle, float u, float v, const float* plain) const;
+  /// The ink at a place of a triangle, or `own` where there is none.
+  const float* colour_at(int triangle, float u, float v, const float* own) const;
 };
 
 /// One surface's or ball's material, in single precision.

@@ -66,9 +66,15 @@ struct PreparedPrint {
   std::vector<Bands<N>> mark_colours;
   PrintIndex index;
   std::shared_ptr<const PrintedPicture> picture;
+  std::vector<int> ground;
+  std::vector<Bands<N>> inks;  // of the ground
+  bool inked;                  // is there anything over the ground?
 
-  /// The ink at a hit, or `plain` where there is none.
-  Bands<N> colour(const RayHit& hit, const Bands<N>& plain) const {
+  /// The ink at a hit, or `own` where there is none.
+  Bands<N> colour(const RayHit& hit, const Bands<N>& own) const {
+    const int under = ground.empty() ? -1 : ground[hit.triangle];
+    const Bands<N>& plain = under < 0 ? own : inks[under];
+    if (!inked) return plain;
     const auto& t = triangles[hit.triangle];
     const Eigen::Vector2d at =
         (1.0 - hit.weight_1 - hit.weight_2) * points[t[0]] + hit.weight_1 * points[t[1]] + hit.weight_2 * points[t[2]];
@@ -141,7 +147,10 @@ struct PreparedScene {
  private:
   void add_print(const Surface& surface) {
     const Print& print = *surface.print;
-    PreparedPrint<N> made{print.material_mm, surface.mesh.triangles, {}, PrintIndex(print.marks), print.picture};
+    const bool inked = !print.marks.empty() || print.picture;
+    PreparedPrint<N> made{print.material_mm, surface.mesh.triangles, {}, PrintIndex(print.marks),
+                          print.picture,     print.ground,           {}, inked};
+    if (!print.ground.empty()) made.inks.assign(print.inks.begin(), print.inks.end());
     for (const PrintedMark& mark : print.marks) made.mark_colours.push_back(print.inks[mark.ink]);
     materials.back().print = static_cast<int>(prints.size());
     prints.push_back(std::move(made));

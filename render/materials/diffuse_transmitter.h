@@ -18,4 +18,11 @@ struct DiffuseTransmitter {
   Spectrum transmittance;
 };
 
+/// What the sheet sends back with something of reflectance `behind` close behind it: light goes to and fro between the
+/// two, which adds up to r + t^2 b / (1 - r b) in each band [Kubelka1948].
+inline Spectrum reflectance_over(const DiffuseTransmitter& sheet, const Spectrum& behind) {
+  const Spectrum through = sheet.transmittance * sheet.transmittance * behind;
+  return sheet.reflectance + (through > 0.0).select(through / (1.0 - sheet.reflectance * behind), 0.0);
+}
+
 }  // namespace touchstone::render

@@ -28,4 +28,17 @@ inline FresnelFace fresnel(double n_from, double n_to, double cos_incident) {
   return {s * s, p * p, c2};
 }
 
+/// What the smooth face of a medium of this index to air sends back of light that comes from within, evenly from all
+/// directions: the mean of Fresnel's reflectance over the squared sine, one beyond the critical angle [Walsh1926].
+inline double diffuse_reflectance_within(double index) {
+  constexpr int kSteps = 2000;
+  const double critical = std::min(1.0, 1.0 / (index * index));
+  double sum = 0.0;
+  for (int i = 0; i < kSteps; ++i) {
+    const double sine_squared = critical * (i + 0.5) / kSteps;
+    sum += fresnel(index, 1.0, std::sqrt(1.0 - sine_squared)).mean_reflectance();
+  }
+  return 1.0 - critical + critical * sum / kSteps;
+}
+
 }  // namespace touchstone::render

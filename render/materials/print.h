@@ -11,8 +11,8 @@
 // Marks are given in material coordinates, mm on the undeformed surface. A point of the surface has those of its
 // triangle's vertices, interpolated; so the edge of a mark is as sharp as the mesh is fine or coarse, follows the
 // material under any deformation, and is smoothed by a pixel's samples only. Where marks overlap the last one shows.
-// Under them there may be one picture, each pixel of it a rectangle of one colour.
-// The frames of a sequence change `mesh.vertices` and leave `print` as it is.
+// Under them there may be one picture, each pixel of it a rectangle of one colour, and under that whole triangles of
+// ink. The frames of a sequence change `mesh.vertices` and leave `print` as it is.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -65,6 +65,8 @@ struct Print {
   std::vector<Spectrum> inks;                ///< take the place of the material's own colour; 0 to 1
   std::vector<PrintedMark> marks;
   std::shared_ptr<const PrintedPicture> picture = nullptr;  ///< under the marks; null for none
+  /// By triangle the ink under marks and picture, -1 for the material's own colour; empty: that everywhere.
+  std::vector<int> ground = {};
 };
 
 /// Finds the mark that a material point lies in; a lookup costs the same for ten marks and for a million of about equal

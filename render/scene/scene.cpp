@@ -119,6 +119,14 @@ void check_print(const Print& print, const Surface& surface, Eigen::Index bands,
       fail("{}: mark {} has ink {}; there are {}", what, i, mark.ink, print.inks.size());
     }
   }
+  if (!print.ground.empty() && print.ground.size() != surface.mesh.triangles.size()) {
+    fail("{}: a ground of {} triangles; the mesh has {}", what, print.ground.size(), surface.mesh.triangles.size());
+  }
+  for (std::size_t i = 0; i < print.ground.size(); ++i) {
+    if (print.ground[i] < -1 || print.ground[i] >= static_cast<int>(print.inks.size())) {
+      fail("{}: the ground of triangle {} has ink {}; there are {}", what, i, print.ground[i], print.inks.size());
+    }
+  }
   if (print.picture) check_picture(*print.picture, bands, what + ": picture");
 }
 

@@ -13,6 +13,7 @@
 #include "sim/plan/plan_time.h"
 #include "sim/plan/scene_bands.h"
 #include "sim/plan/size_doubt.h"
+#include "sim/plan/translucent_coat.h"
 #include "sim/scene/device_gel.h"
 
 namespace touchstone::sim {
@@ -339,6 +340,24 @@ void plan_bands(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   table.add("spectral bands", true, why, fmt::format("{} band{} a path", count, count == 1 ? "" : "s"));
 }
 
+void plan_translucent_coating(const SceneSpec& scene, Plan& plan, PlanTable& table) {
+  const DeviceSpec& device = scene.device;
+  const bool translucent = device.coating && device.coating->transmittance.largest() > 0.0;
+  if (!translucent) {
+    const char* why = device.coating ? "the coating lets no light through" : "the gel has no coating";
+    plan.translucent_coating = table.add("translucent coating", false, why, "");
+    return;
+  }
+  const double change = largest_change(translucent_coat(scene, plan.bands));
+  const double least = 0.5 / ((1 << device.camera->bits) - 1);
+  plan.translucent_coating = table.add(
+      "translucent coating", scene.effects.translucent_coating, change >= least,
+      fmt::format(
+          "what touches the coating makes it brighter or darker by up to {:.2g} %; half a digital number is {:.2g} %",
+          100 * change, 100 * least),
+      "a look-up a hit");
+}
+
 void plan_light(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   const bool images = scene.outputs.camera();
   plan.camera = table.add(
@@ -374,6 +393,7 @@ void plan_light(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   plan_print(scene, plan, table);
   plan_interreflection(scene, plan, table);
   plan_bands(scene, plan, table);
+  plan_translucent_coating(scene, plan, table);
   if (!scene.device.background.empty()) {
     table.add("background", true,
               "the device has a frame of an untouched unit: pictures show it where nothing is pressed",

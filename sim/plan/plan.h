@@ -29,8 +29,9 @@ struct Plan {
   bool refraction = false;
   bool interreflection = false;
   bool scattering = false;
-  bool object_print = false;    ///< what is printed on objects is seen
-  bool skin_blanching = false;  ///< and depends on how they are pressed
+  bool translucent_coating = false;  ///< objects are seen through the coating where they touch it
+  bool object_print = false;         ///< what is printed on objects is seen
+  bool skin_blanching = false;       ///< and depends on how they are pressed
   bool sensor_noise = false;
   bool vignetting = false;  ///< these six: of the camera's pipeline (render/imager/imager.h)
   bool hot_pixels = false;

@@ -25,12 +25,14 @@ std::vector<NamedColour> reflecting(const SceneSpec& scene) {
   if (device.coating) {
     all.push_back(
         {device.coating->albedo, device.coating->type == CoatingType::matt ? "coating.albedo" : "coating.reflectance"});
+    all.push_back({device.coating->transmittance, "coating.transmittance"});
     if (device.coating->print) all.push_back({device.coating->print->colour, "coating.print.colour"});
   }
   if (device.pins) all.push_back({device.pins->colour, "pins.colour"});
-  if (!device.coating) {  // a coating hides the objects
-    for (const MovedObject& moved : moved_objects(scene)) {
-      all.push_back({moved.object.albedo, "albedo"});
+  if (device.coating && device.coating->transmittance.largest() == 0.0) return all;  // it hides the objects
+  for (const MovedObject& moved : moved_objects(scene)) {
+    all.push_back({moved.object.albedo, "albedo"});
+    if (!device.coating) {
       for (Colour& ink : inks_of(moved.object.print)) all.push_back({std::move(ink), "print"});
     }
   }

@@ -103,7 +103,24 @@ void check_camera_outside(const DeviceSpec& device, const SourceLocation& where)
   }
 }
 
-/// No lamp is in the gel; those with a lens are before the plate, the others may be in it.
+/// Does the straight line between two places pass a pad whose sides are clear, with all of it beyond one of them?
+bool is_beside(const GelSpec& gel, const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  if (gel.frame != GelFrame::clear || std::max(from.z(), to.z()) >= 0.0) return false;
+  if (const SlabSpec* slab = gel.slab()) {
+    for (const double side : {-1.0, 1.0}) {
+      if (std::min(side * from.x(), side * to.x()) > slab->size_x_mm / 2) return true;
+      if (std::min(side * from.y(), side * to.y()) > slab->size_y_mm / 2) return true;
+    }
+    return false;
+  }
+  const double radius = gel.dome() ? gel.dome()->base_radius_mm : gel.fingertip() ? gel.fingertip()->radius_mm : 0.0;
+  const Eigen::Vector2d way = (to - from).head<2>();
+  const double along =
+      way.isZero() ? 0.0 : std::clamp(-way.dot(from.head<2>()) / way.squaredNorm(), 0.0, 1.0);  // to the nearest place
+  return radius > 0.0 && (from.head<2>() + along * way).norm() > radius;
+}
+
+/// No lamp is in the gel; those with a lens are before the plate, the others may be in it, and LEDs beside clear sides.
 void check_lamps_outside(const DeviceSpec& device, const SourceLocation& where) {
   const double gel_face = -device.gel.thickness_mm;
   const double plate_face = gel_face - device.plate.thickness_mm;
@@ -114,7 +131,18 @@ void check_lamps_outside(const DeviceSpec& device, const SourceLocation& where) 
       fail_at(where, "lamps: a lamp at z = {} is not in front of the plate, whose lower face is at z = {}", z,
               plate_face);
     }
-    if (z >= gel_face) fail_at(where, "lamps: a lamp at z = {} is in the gel, which begins at z = {}", z, gel_face);
+    const bool strip = lamp.type == LampType::led_strip;
+    if ((strip || lamp.type == LampType::led) &&
+        is_beside(device.gel, lamp.position_mm, strip ? lamp.to_mm : lamp.position_mm)) {
+      continue;
+    }
+    if (z >= gel_face) {
+      fail_at(
+          where,
+          "lamps: a lamp at z = {} is in the gel, which begins at z = {}; LEDs and strips may stand so high beside a "
+          "pad with gel.frame: clear, below z = 0",
+          z, gel_face);
+    }
   }
 }
 
@@ -196,6 +224,10 @@ void check_optics(const YamlReader& in, const CameraSpec& camera) {
 
 }  // namespace
 
+EnumNames<GelFrame> enum_names(GelFrame) {
+  return {{"painted", GelFrame::painted}, {"clear", GelFrame::clear}};
+}
+
 EnumNames<CoatingType> enum_names(CoatingType) {
   return {{"matt", CoatingType::matt}, {"metal", CoatingType::metal}};
 }
@@ -273,7 +305,8 @@ void fields(YamlReader& in, GelSpec& gel) {
   in.optional("absorption_per_mm", gel.absorption_per_mm, Allowed::at_least(0.0));
   in.optional("scattering_per_mm", gel.scattering_per_mm, Allowed::within(0.0, 1000.0));
   in.optional("scattering_anisotropy", gel.scattering_anisotropy, Allowed::within(-0.999, 0.999));
-  in.optional("frame_albedo", gel.frame_albedo, part_of_one());
+  in.optional("frame", gel.frame);
+  if (gel.frame == GelFrame::painted) in.optional("frame_albedo", gel.frame_albedo, part_of_one());
   double relaxing = 0.0;
   for (const RelaxationTermSpec& term : gel.relaxation) relaxing += term.share;
   if (relaxing >= 1.0) {
@@ -336,6 +369,7 @@ void fields(YamlReader& in, CoatingSpec& coating) {
   in.required("type", coating.type);
   in.required(coating.type == CoatingType::matt ? "albedo" : "reflectance", coating.albedo, part_of_one());
   if (coating.type == CoatingType::metal) in.optional("roughness", coating.roughness, Allowed::within(0.02, 1.0));
+  if (coating.type == CoatingType::matt) in.optional("transmittance", coating.transmittance, part_of_one());
   in.optional("print", coating.print);
 }
 
@@ -512,6 +546,9 @@ void fields(YamlReader& in, DeviceSpec& device) {
   in.optional("plate", device.plate);
   in.optional("lamps", device.lamps);
   in.optional("coating", device.coating);
+  if (device.gel.frame == GelFrame::clear && !device.coating) {
+    fail_at(in.where("gel"), "gel.frame: clear is for coated gels; a gel that can be seen through has a painted frame");
+  }
   in.optional("pins", device.pins);
   in.optional("films", device.films);
   in.optional("bands", device.bands);

@@ -69,6 +69,11 @@ struct GelLayerSpec {
   double poisson_ratio = 0.49;
 };
 
+/// What holds a pad at its sides: something painted, or the same clear stuff that goes on round it (a clear case,
+/// potting or glue), so that light passes the sides as if they weren't there.
+enum class GelFrame { painted, clear };
+EnumNames<GelFrame> enum_names(GelFrame);
+
 /// The soft body, clamped to the plate on its back. Gel frame: origin in the middle of the outer surface, +z out of the
 /// gel, back at z = -thickness. `shape` in the file says which shape it has; fields of other shapes may not stand
 /// there.
@@ -84,7 +89,8 @@ struct GelSpec {
   Colour absorption_per_mm = 0.0;      ///< natural logarithm
   Colour scattering_per_mm = 0.0;      ///< of a milky gel
   double scattering_anisotropy = 0.0;  ///< mean cosine of a scattering
-  Colour frame_albedo = 0.0;           ///< of the frame that holds the pad at its sides; 0 is black
+  GelFrame frame = GelFrame::painted;  ///< at the pad's sides; clear ones are for coated gels
+  Colour frame_albedo = 0.0;           ///< of a painted one; 0 is black
 
   // Null if the gel has another shape.
   const SlabSpec* slab() const { return std::get_if<SlabSpec>(&shape); }
@@ -145,12 +151,16 @@ struct PrintSpec {
 enum class CoatingType { matt, metal };
 EnumNames<CoatingType> enum_names(CoatingType);
 
-/// An opaque coat on the gel's outer surface, seen from within; the camera then sees nothing of the objects. For
-/// mechanics it isn't there: give a layer (GelLayerSpec) if it is stiff.
+/// A coat on the gel's outer surface, seen from within. Of the objects the camera then sees nothing, or, through a coat
+/// with a transmittance, whether what touches it is bright or dark. For mechanics it isn't there: give a layer
+/// (GelLayerSpec) if it is stiff.
 struct CoatingSpec {
   CoatingType type = CoatingType::matt;
   Colour albedo = 0.5;     ///< of a matt one; of a metal one the reflectance at normal incidence
   double roughness = 0.3;  ///< of a metal one: GGX alpha
+  /// Of a matt one: what it lets through of the light that meets it, diffusely, while it lies between two gels.
+  /// `albedo` is then what it sends back by itself, with nothing behind it (sim/view/translucent_coat.h).
+  Colour transmittance = 0.0;
   std::optional<PrintSpec> print;
 };
 

@@ -87,6 +87,7 @@ struct EffectSwitches {
   Switch relaxation = Switch::automatic;
   Switch inertia = Switch::automatic;
   Switch interreflection = Switch::automatic;
+  Switch translucent_coating = Switch::automatic;
   Switch direct_light = Switch::automatic;
   Switch shared_paths = Switch::automatic;
   Switch motion_blur = Switch::automatic;

@@ -145,6 +145,7 @@ std::string unfit_for_milky_coat(const DeviceSpec& device, const render::Scene& 
   if (device.beads || device.films || device.pins || device.coating->print) {
     return "there's something else in the gel or on its coating";
   }
+  if (device.coating->transmittance.largest() > 0.0) return "the coating lets light through";
   if (at_rest.lamps.empty()) return "the device has no lamps";
   for (const render::Lamp& lamp : at_rest.lamps) {
     if (std::holds_alternative<render::GuideLamp>(lamp)) return "a light guide's light isn't that of a point";

@@ -24,8 +24,8 @@ SceneView::SceneView(const SceneSpec& scene_of, const Plan& plan_of, const fem::
 }
 
 render::Scene SceneView::seen_coating(const fem::PressState& press, const SeenGeometry& geometry) const {
-  render::Scene out = scene_without_surface(scene, plan, {}, {}, press);
-  out.surfaces.insert(out.surfaces.begin(), coated_surface(scene.device, plan.bands, geometry.sheet));
+  render::Scene out = scene_in_coating(scene, plan, press);
+  out.surfaces.insert(out.surfaces.begin(), coated_surface(scene, plan, geometry.sheet));
   return with_pins(std::move(out), press);
 }
 

@@ -6,6 +6,7 @@
 #include "core/random.h"
 #include "core/units.h"
 #include "sim/plan/scene_bands.h"
+#include "sim/plan/translucent_coat.h"
 #include "sim/scene/device_faces.h"
 #include "sim/scene/device_gel.h"
 #include "sim/scene/device_lamps.h"
@@ -118,6 +119,19 @@ render::Print print_of(const PrintSpec& spec, const GelSpec& gel, const SceneBan
   return print;
 }
 
+/// Colours the triangles of a translucent coat that lie on objects, under its print.
+void show_touched(const SceneSpec& scene, const SceneBands& bands, const GelSheet& sheet,
+                  std::optional<render::Print>& print) {
+  if (!print) {
+    print.emplace();
+    print->material_mm.assign(sheet.rest.size(), Eigen::Vector2d::Zero());
+  }
+  const auto first = static_cast<int>(print->inks.size());
+  for (render::Spectrum& touched : translucent_coat(scene, bands).touched) print->inks.push_back(std::move(touched));
+  print->ground.reserve(sheet.touched.size());
+  for (const int body : sheet.touched) print->ground.push_back(body < 0 ? -1 : first + body);
+}
+
 /// All of a device's film squares as one sheet, just inside the gel.
 render::Surface film_sheet(const FilmSpec& films, const SceneBands& bands, double thickness_mm) {
   TriangleMesh mesh;
@@ -192,15 +206,20 @@ render::Surface gel_surface(TriangleMesh mesh) {
   return {std::move(mesh), render::Refractive{kGel, kAir}};
 }
 
-render::Surface coated_surface(const DeviceSpec& device, const SceneBands& bands, GelSheet sheet) {
+render::Surface coated_surface(const SceneSpec& scene, const Plan& plan, GelSheet sheet) {
+  const DeviceSpec& device = scene.device;
+  const SceneBands& bands = plan.bands;
   const CoatingSpec& coating = *device.coating;
   render::Surface out;
-  if (coating.type == CoatingType::matt) {
-    out.material = render::Lambertian{in_bands(coating.albedo, bands, "coating.albedo")};
-  } else {
+  if (coating.type == CoatingType::metal) {
     out.material = render::RoughConductor{in_bands(coating.albedo, bands, "coating.reflectance"), coating.roughness};
+  } else if (coating.transmittance.largest() > 0.0) {
+    out.material = render::Lambertian{translucent_coat(scene, bands).free};
+  } else {
+    out.material = render::Lambertian{in_bands(coating.albedo, bands, "coating.albedo")};
   }
   if (coating.print) out.print = print_of(*coating.print, device.gel, bands, sheet.rest);
+  if (plan.translucent_coating) show_touched(scene, bands, sheet, out.print);
   out.normals = vertex_normals(sheet.mesh);
   out.mesh = std::move(sheet.mesh);
   // What is bonded there moves by some hundredths of a micrometre, as displacements are means over the mesh's hats; but
@@ -254,21 +273,18 @@ render::Scene scene_without_surface(const SceneSpec& scene, const Plan& plan, co
   return out;
 }
 
-namespace {
-
-/// What the camera of a coated device sees beside the coating.
 render::Scene scene_in_coating(const SceneSpec& scene, const Plan& plan, const fem::PressState& press) {
-  return scene_without_surface(scene, plan, {}, {}, press);
+  render::Scene out = scene_without_surface(scene, plan, {}, {}, press);
+  if (scene.device.gel.frame == GelFrame::clear) out.surfaces.erase(out.surfaces.begin());
+  return out;
 }
-
-}  // namespace
 
 render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const std::vector<VisibleObject>& objects,
                             const VisibleGel& gel, const fem::PressState& press) {
   const std::vector<PlacedShape> shapes = placed_shapes(objects, press);
   if (scene.device.coating) {
     render::Scene out = scene_in_coating(scene, plan, press);
-    out.surfaces.insert(out.surfaces.begin(), coated_surface(scene.device, plan.bands, gel.sheet(press, shapes)));
+    out.surfaces.insert(out.surfaces.begin(), coated_surface(scene, plan, gel.sheet(press, shapes)));
     return out;
   }
   render::Scene out = scene_without_surface(scene, plan, objects, poses_of(press), press);
@@ -293,8 +309,7 @@ render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const std:
   TS_ASSERT(objects.size() == 1);
   if (scene.device.coating) {
     render::Scene out = scene_in_coating(scene, plan, press);
-    out.surfaces.insert(out.surfaces.begin(),
-                        coated_surface(scene.device, plan.bands, whole_sheet(membrane.sheet(press, relief))));
+    out.surfaces.insert(out.surfaces.begin(), coated_surface(scene, plan, whole_sheet(membrane.sheet(press, relief))));
     return out;
   }
   render::Scene out = scene_without_surface(scene, plan, objects, poses_of(press, relief), press);

@@ -51,17 +51,20 @@ std::vector<Eigen::Vector2d> print_coordinates(const PrintSpec& print, const Gel
                                                const std::vector<Eigen::Vector3d>& rest);
 
 /// A coated gel's outer surface. @pre the device has a coating
-render::Surface coated_surface(const DeviceSpec& device, const SceneBands& bands, GelSheet sheet);
+render::Surface coated_surface(const SceneSpec& scene, const Plan& plan, GelSheet sheet);
 
 /// All of visible_scene but the gel's outer surface: its frame first, then each object followed by its screen if it has
 /// one, then the films.
 render::Scene scene_without_surface(const SceneSpec& scene, const Plan& plan, const std::vector<VisibleObject>& objects,
                                     const std::vector<RigidTransform>& poses, const fem::PressState& press);
 
+/// What the camera of a coated device sees beside the coating: the gel's frame, unless that is clear, first.
+render::Scene scene_in_coating(const SceneSpec& scene, const Plan& plan, const fem::PressState& press);
+
 /// Plate, gel, beads, objects and lamps as they stand at `press`. Where the gel is wetted by the object there is no
 /// face between them: the light goes on into the object. A coated gel shows its coating and nothing of what is beyond.
-/// Surfaces: the gel's outer surface (of a clear gel where it's dry), its frame, then each object followed by its
-/// screen if it has one (not with a coating), then the films. Balls: the beads in their order.
+/// Surfaces: the gel's outer surface (of a clear gel where it's dry), its frame unless that is clear, then each object
+/// followed by its screen if it has one (not with a coating), then the films. Balls: the beads in their order.
 render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const std::vector<VisibleObject>& objects,
                             const VisibleGel& gel, const fem::PressState& press);
 

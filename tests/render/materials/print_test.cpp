@@ -82,6 +82,18 @@ TEST(Print, DiscCoversItsAreaOnAnyMesh) {
   }
 }
 
+// Of 37 x 37 squares of two triangles one of each square's is ink, and a mark lies over both.
+TEST(Print, TrianglesOfInkLieUnderTheMarks) {
+  Print print = one_disc({1.2, -0.7}, 2.0, 0.1);
+  print.inks.push_back(grey(0.3));
+  Surface surface = printed_sheet(37, kFlat, Lambertian{grey(0.9)}, print);
+  for (std::size_t i = 0; i < surface.mesh.triangles.size(); ++i) surface.print->ground.push_back(i % 2 == 0 ? 1 : -1);
+  EXPECT_NEAR(look_down(surface, 5.0, 0.1).share, kPi * 4.0 / 100.0, 3e-4);
+  EXPECT_NEAR(look_down(surface, 5.0, 0.3).share, 0.5 * (1.0 - kPi * 4.0 / 100.0), 5e-3);
+  surface.print->marks.clear();
+  EXPECT_NEAR(look_down(surface, 5.0, 0.3).share, 0.5, 5e-3);
+}
+
 TEST(Print, SquareCoversItsSideSquared) {
   Print print = one_disc({1.2, -0.7}, 1.5, 0.1);
   print.marks[0].shape = MarkShape::square;

@@ -4,9 +4,11 @@
 
 #include <cmath>
 
+#include "closed_forms/light_closed_forms.h"
 #include "core/random.h"
 #include "core/units.h"
 #include "light_scenes.h"
+#include "render/materials/fresnel.h"
 #include "render/materials/thin_film.h"
 
 namespace touchstone::render {
@@ -115,6 +117,38 @@ TEST(DiffuseTransmitter, HollowSphereFillsWithLight) {
     EXPECT_NEAR(seen.mean, passed / (1.0 - reflectance), 3.5 * seen.error) << reflectance;
     EXPECT_LT(seen.error, 0.01);
   }
+}
+
+// Light goes to and fro between the sheet and a wall close behind it: R + T^2 b / (1 - R b).
+TEST(DiffuseTransmitter, AWallBehindTheSheetIsSeenThroughIt) {
+  for (double wall : {0.0, 0.3, 1.0}) {
+    Scene scene = empty_scene(1.0);
+    const DiffuseTransmitter sheet{grey(0.5), grey(0.4)};
+    scene.surfaces.push_back({square_sheet(100.0, 0.0), sheet});
+    scene.surfaces.push_back({square_sheet(100.0, -0.001), Lambertian{grey(wall)}});
+    const Estimate seen = view(scene, {0, 0, 3}, {0.3, 0, -1}, 400);
+    EXPECT_NEAR(reflectance_over(sheet, grey(wall))[0], 0.5 + 0.16 * wall / (1.0 - 0.5 * wall), 1e-12);
+    EXPECT_NEAR(seen.mean, reflectance_over(sheet, grey(wall))[0], 3.5 * seen.error + 1e-9) << wall;
+    EXPECT_LT(seen.error, 0.005);
+  }
+}
+
+// In a gel, close before its face to air: the face sends back 0.536 of diffuse light at an index of 1.41. Radiance is
+// basic.
+TEST(DiffuseTransmitter, ASheetBeforeItsMediumsFaceGetsItsLightBack) {
+  const double face = diffuse_reflectance_within(1.41);
+  EXPECT_NEAR(face, closed_forms::internal_diffuse_reflectance(1.41), 2e-4);
+  EXPECT_NEAR(diffuse_reflectance_within(1.5), 0.596, 5e-4);
+  EXPECT_NEAR(diffuse_reflectance_within(1.0), 0.0, 1e-12);
+  Scene scene = empty_scene(0.0);
+  scene.media = {Medium{1.41, {}}, Medium{1.0, {}}};
+  scene.faces = {{0.001, 0, 1}};
+  const DiffuseTransmitter sheet{grey(0.4), grey(0.5)};
+  scene.surfaces.push_back({square_sheet(200.0, 0.0), sheet});
+  scene.surfaces.push_back({square_sheet(200.0, -2.0), Emitter{grey(1.0)}});
+  const Estimate seen = view(scene, {0, 0, -1}, {0.2, 0, 1}, 2000);
+  EXPECT_NEAR(seen.mean, reflectance_over(sheet, grey(face))[0], 3.5 * seen.error);
+  EXPECT_LT(seen.error, 0.01);
 }
 
 TEST(DiffuseTransmitter, WhiteHollowSphereIsAWhiteFurnace) {

@@ -245,6 +245,15 @@ TEST(SceneFiles, AForceErrorMayStandInPlaceOfAMesh) {
   EXPECT_THAT(error_of_device(with_mesh("{fine_mm: 0.5, contact_radius_mm: 1}")), HasSubstr("contact_radius_mm"));
 }
 
+TEST(SceneFiles, ClearSidesAreForCoatedGels) {
+  const std::string clear = replaced(kDevice, "  thickness_mm: 4\n", "  thickness_mm: 4\n  frame: clear\n");
+  const std::string coating = "coating: {type: matt, albedo: 0.5}\n";
+  EXPECT_EQ(parse_yaml<DeviceSpec>(clear + coating, "device.yaml").gel.frame, GelFrame::clear);
+  EXPECT_THAT(error_of_device(clear), HasSubstr("device.yaml:3: gel.frame: clear is for coated gels"));
+  EXPECT_THAT(error_of_device(replaced(clear, "clear\n", "clear\n  frame_albedo: 0.5\n") + coating),
+              HasSubstr("unknown key 'frame_albedo'"));
+}
+
 TEST(SceneFiles, BeadsMustLieInTheGel) {
   const std::string beads = "beads: {grid: 3, spacing_mm: 2, diameter_mm: 0.5, depth_mm: 0.2}\n";
   EXPECT_THAT(error_of_device(kDevice + beads), HasSubstr("beads.depth_mm: 0.2 puts beads"));

@@ -10,6 +10,7 @@
 #include <fstream>
 #include <opencv2/core.hpp>
 
+#include "core/error.h"
 #include "core/whole_file.h"
 #include "sim/plan/plan.h"
 #include "sim/press/gel_setup.h"
@@ -17,6 +18,7 @@
 #include "sim/press/truth.h"
 #include "sim/scene/scene.h"
 #include "sim/sensor/virtual_camera.h"
+#include "tests/support/message_of.h"
 #include "tests/support/temporary_folder.h"
 
 namespace touchstone::sim {
@@ -45,13 +47,16 @@ const test::TemporaryFolder& folder() {
 
 /// A ball pressed into a pad of 12 x 12 x 3 mm, with the lamps beside a lens of 24 x 24 pixels. `keys` are further
 /// lines of the scene file, from its fifth line on.
-SceneSpec scene_of(const std::string& coating, const std::string& keys = "", const std::string& lamps = kSpots) {
+SceneSpec scene_of(const std::string& coating, const std::string& keys = "", const std::string& lamps = kSpots,
+                   const std::string& gel = "") {
   const auto& at = folder().path();
   const auto write = [&](const char* name, const std::string& text) {
     write_whole_file(at / name, [&](const std::filesystem::path& file) { std::ofstream(file) << text; });
   };
   write("device.yaml", R"(name: coated
-gel: {size_x_mm: 12, size_y_mm: 12, thickness_mm: 3, youngs_modulus_MPa: 0.3, poisson_ratio: 0.49, refractive_index: 1.41}
+gel: {size_x_mm: 12, size_y_mm: 12, thickness_mm: 3, youngs_modulus_MPa: 0.3, poisson_ratio: 0.49, refractive_index: 1.41)" +
+                           gel +
+                           R"(}
 mesh: {fine_mm: 0.8, coarse_mm: 2, fine_half_extent_mm: [3, 3], fine_depth_mm: 1}
 plate: {thickness_mm: 1, refractive_index: 1.5}
 camera: {type: lens, width: 24, height: 24, pixel_pitch_um: 107, focal_length_mm: 6, f_number: 8, focus_distance_mm: 27,
@@ -129,6 +134,73 @@ TEST(DirectLight, ACoatedGelsPicturesAreWithinTheTolerance) {
   EXPECT_LT(off_paths(last.radiance, traced), scene.light.direct_tolerance);
   EXPECT_GT(off_paths(seen.camera->capture(seen.truths.front()).radiance, traced), scene.light.direct_tolerance)
       << "the press is seen";
+}
+
+const std::string kTranslucent = "coating: {type: matt, albedo: 0.4, transmittance: 0.3}\n";
+
+SceneSpec with_ball(SceneSpec scene, double albedo) {
+  scene.object.albedo = albedo;
+  return scene;
+}
+
+// Behind the touched coat lies the ball in place of the gel's face to air (0.536): 0.4 + 0.09 b / (1 - 0.4 b).
+TEST(DirectLight, ATranslucentCoatShowsWhetherABrightOrADarkBallTouchesIt) {
+  const Seen dark = see(with_ball(scene_of(kTranslucent), 0.0));
+  const Seen bright = see(with_ball(scene_of(kTranslucent), 0.9));
+  ASSERT_TRUE(dark.plan.translucent_coating && bright.plan.translucent_coating);
+  ASSERT_TRUE(dark.camera->light_choice().direct) << dark.camera->light_choice().reason;
+  const auto ratio = [](const cv::Mat& above, const cv::Mat& below, int row, int column, int band) {
+    return above.at<cv::Vec3f>(row, column)[band] / below.at<cv::Vec3f>(row, column)[band];
+  };
+  const cv::Mat of_dark = dark.last().radiance;
+  const cv::Mat of_bright = bright.last().radiance;
+  const cv::Mat at_rest = dark.camera->capture(dark.truths.front()).radiance;
+  for (int band = 0; band < 3; ++band) {
+    EXPECT_NEAR(ratio(of_bright, of_dark, 12, 12, band), 1.0 + 0.09 * 0.9 / (1.0 - 0.36) / 0.4, 2e-3);
+    EXPECT_NEAR(ratio(of_bright, of_dark, 1, 1, band), 1.0, 2e-3);
+    const double free = 0.4 + 0.09 * 0.536 / (1.0 - 0.4 * 0.536);
+    EXPECT_NEAR(ratio(of_dark, at_rest, 12, 12, band), 0.4 / free, 0.1) << "the ball's middle lies deeper";
+  }
+  const std::array<cv::Mat, 2> traced = traced_twice(dark.scene, 2);
+  EXPECT_LT(off_paths(of_dark, traced), dark.scene.light.direct_tolerance);
+  EXPECT_GT(off_paths(of_bright, traced), off_paths(of_dark, traced));
+}
+
+TEST(DirectLight, ACoatIsTranslucentWhereThatIsSeen) {
+  const auto change_of = [](const std::string& coating, double albedo, const std::string& keys = "") {
+    return make_plan(with_ball(scene_of(coating, keys), albedo)).translucent_coating;
+  };
+  EXPECT_TRUE(change_of(kTranslucent, 0.4));
+  EXPECT_FALSE(change_of(kTranslucent, 0.535)) << "as bright as the gel's own face";
+  EXPECT_FALSE(change_of("coating: {type: matt, albedo: 0.4, transmittance: 0.02}\n", 0.9));
+  EXPECT_FALSE(change_of(kMatt, 0.9));
+  EXPECT_FALSE(change_of(kTranslucent, 0.0, "effects: {translucent_coating: off}\n"));
+  EXPECT_THROW(change_of("coating: {type: metal, reflectance: 0.4, transmittance: 0.2}\n", 0.4), Error);
+  EXPECT_THAT(test::message_of([&] { change_of("coating: {type: matt, albedo: 0.8, transmittance: 0.3}\n", 0.4); }),
+              AllOf(HasSubstr("device.yaml:7"), HasSubstr("coating.transmittance: with albedo it is 1.1")));
+  SceneSpec luminous = scene_of(kTranslucent);
+  luminous.object.radiance = 1.0;
+  EXPECT_THAT(test::message_of([&] { make_plan(luminous); }), HasSubstr("a luminous object isn't simulated behind"));
+  luminous.effects.translucent_coating = Switch::off;
+  EXPECT_FALSE(make_plan(luminous).translucent_coating);
+}
+
+// LEDs beside the pad, as deep as it: what is painted round it hides them.
+TEST(DirectLight, LightComesInThroughClearSides) {
+  const std::string leds = R"(
+  - {type: led, position_mm: [-8, 0, -2.5], target_mm: [0, 0, -1], power_W: [1, 0, 0]}
+  - {type: led, position_mm: [0, 8, -2.5], target_mm: [0, 0, -1], power_W: [0, 1, 0]}
+)";
+  EXPECT_THAT(test::message_of([&] { scene_of(kMatt, "", leds); }), HasSubstr("z = -2.5 is in the gel"));
+  SceneSpec scene = scene_of(kMatt, "", leds, ", frame: clear");
+  const Seen clear = see(scene);
+  ASSERT_TRUE(clear.camera->light_choice().direct) << clear.camera->light_choice().reason;
+  const cv::Mat lit = clear.last().radiance;
+  EXPECT_GT(lit.at<cv::Vec3f>(12, 12)[0], 1e-3f);
+  EXPECT_LT(off_paths(lit, traced_twice(scene, 2)), scene.light.direct_tolerance);
+  EXPECT_GT(lit.at<cv::Vec3f>(12, 3)[0], lit.at<cv::Vec3f>(12, 20)[0]) << "red comes from the left";
+  scene.device.gel.frame = GelFrame::painted;
+  EXPECT_LT(see(scene).last().radiance.at<cv::Vec3f>(12, 12)[0], 1e-6f);
 }
 
 TEST(DirectLight, SwitchedOffOrTooFarOffThePathTracersBytesStay) {

@@ -211,7 +211,7 @@ TEST(LightDevice, CoatingHidesTheObjectAndPrintMovesWithTheGel) {
   const GelSheet sheet =
       VisibleGel(*pressed.gel)
           .sheet(pressed.truths.back().press, placed_shapes(visible_objects(scene), pressed.truths.back().press));
-  const render::Surface coat = coated_surface(scene.device, pressed.plan.bands, sheet);
+  const render::Surface coat = coated_surface(scene, pressed.plan, sheet);
   ASSERT_TRUE(coat.print);
   ASSERT_EQ(coat.print->marks.size(), 9u);
   EXPECT_EQ(coat.print->marks[5].centre, Eigen::Vector2d(3, 0));
