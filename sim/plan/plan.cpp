@@ -13,8 +13,8 @@
 #include "sim/plan/plan_time.h"
 #include "sim/plan/scene_bands.h"
 #include "sim/plan/size_doubt.h"
-#include "sim/plan/translucent_coat.h"
 #include "sim/scene/device_gel.h"
+#include "sim/scene/translucent_coat.h"
 
 namespace touchstone::sim {
 namespace {

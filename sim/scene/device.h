@@ -159,7 +159,7 @@ struct CoatingSpec {
   Colour albedo = 0.5;     ///< of a matt one; of a metal one the reflectance at normal incidence
   double roughness = 0.3;  ///< of a metal one: GGX alpha
   /// Of a matt one: what it lets through of the light that meets it, diffusely, while it lies between two gels.
-  /// `albedo` is then what it sends back by itself, with nothing behind it (sim/view/translucent_coat.h).
+  /// `albedo` is then what it sends back by itself, with nothing behind it (sim/scene/translucent_coat.h).
   Colour transmittance = 0.0;
   std::optional<PrintSpec> print;
 };

@@ -6,11 +6,11 @@
 #include "core/random.h"
 #include "core/units.h"
 #include "sim/plan/scene_bands.h"
-#include "sim/plan/translucent_coat.h"
 #include "sim/scene/device_faces.h"
 #include "sim/scene/device_gel.h"
 #include "sim/scene/device_lamps.h"
 #include "sim/scene/scattered_print.h"
+#include "sim/scene/translucent_coat.h"
 
 namespace touchstone::sim {
 namespace {

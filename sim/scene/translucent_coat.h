@@ -11,7 +11,6 @@
 
 #include <vector>
 
-#include "render/spectra/spectrum.h"
 #include "sim/files/colour.h"
 #include "sim/scene/scene.h"
 

@@ -1,4 +1,4 @@
-#include "sim/plan/translucent_coat.h"
+#include "sim/scene/translucent_coat.h"
 
 #include <algorithm>
 
