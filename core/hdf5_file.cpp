@@ -523,6 +523,15 @@ void Hdf5Reader::walk_list(const std::string& path) const {
   read_list_part(path, H5T_NATIVE_INT64, 0, 1, &first);  // and every filter
 }
 
+void Hdf5Reader::walk_rows(const std::string& path) const {
+  const auto held = hold();
+  const std::vector<std::int64_t> shape = extents(path);
+  if (shape.empty() || shape[0] == 0) return;
+  const Handle dataset(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
+  H5Dget_storage_size(dataset);
+  read_rows<double>(path, 0, 1);
+}
+
 void Hdf5Reader::read_list_part(const std::string& path, Hdf5Id type, std::int64_t first, std::int64_t count,
                                 void* values) const {
   const auto held = hold();

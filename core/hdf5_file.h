@@ -173,6 +173,9 @@ class Hdf5Reader {
   /// Goes through all that HDF5 itself keeps of a list of whole numbers (not through the numbers): where damage would
   /// end the process, it does so here. For use within isolated_call.
   void walk_list(const std::string& path) const;
+  /// Likewise through what HDF5 keeps of an array of numbers of any shape, of which rows are read later: its first row
+  /// is read, too.
+  void walk_rows(const std::string& path) const;
   /// Reads into `values` as many numbers of a list as fit, from number `first` on. What T can't hold
   /// becomes the nearest value that it can. @pre they are there
   template <typename T>
@@ -211,5 +214,12 @@ class Hdf5Reader {
 /// beyond its memory. To be called before a file from outside is read in the same way.
 /// @throws Error that `read` threw, or that says that HDF5 didn't come back
 void try_hdf5(const std::filesystem::path& file, const std::function<void()>& read);
+
+/// try_hdf5, and then `read` in this process. @returns what it returns @throws Error as try_hdf5
+template <typename Read>
+auto read_hdf5(const std::filesystem::path& file, const Read& read) {
+  try_hdf5(file, [&read] { read(); });
+  return read();
+}
 
 }  // namespace touchstone

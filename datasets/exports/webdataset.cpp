@@ -157,11 +157,23 @@ struct Sample {
   }
 };
 
+/// All that an export asks HDF5 for of a block, in a process of its own; pictures are read sample by sample later.
+void try_block(const fs::path& path) {
+  try_hdf5(path, [&path] {
+    const OpenBlock block(path);
+    block.file.read_texts("/device_yaml");
+    for (const char* picture : {"/frame", "/height", "/contact", "/background"}) {
+      if (block.file.has(picture)) block.file.walk_rows(picture);
+    }
+  });
+}
+
 /// The samples of each split, in order.
 std::vector<std::vector<std::int64_t>> samples_by_split(const fs::path& folder, const Manifest& manifest) {
   std::vector<std::vector<std::int64_t>> result(kSplits);
   for (const ManifestBlock& block : manifest.blocks) {
     const fs::path path = folder / block.name;
+    try_block(path);
     const auto split = Hdf5Reader(path).read<std::uint8_t>("/split").values;
     if (static_cast<std::int64_t>(split.size()) != block.samples) {
       fail("{}: has {} samples, dataset.json says {}", path.string(), split.size(), block.samples);

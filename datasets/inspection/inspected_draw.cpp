@@ -68,34 +68,6 @@ double height_at(const cv::Mat& height, const cv::Point2d& at) {
   return std::isfinite(mean) ? mean : height.at<float>(static_cast<int>(at.y), static_cast<int>(at.x));
 }
 
-void read_block(const ManifestBlock& block, InspectedSet& set, std::vector<std::array<std::int64_t, 3>>& splits,
-                std::vector<std::set<std::string>>& objects) {
-  const fs::path path = set.folder / block.name;
-  const Hdf5Reader file(path);
-  const auto count = static_cast<std::size_t>(block.samples);
-  const auto whole = [&](const char* name) {
-    auto values = file.read<std::int32_t>(name).values;
-    if (values.size() != count) fail("{}: '{}' has another shape than it should", path.string(), name);
-    return values;
-  };
-  std::vector<InspectedSample> samples = read_sample_columns(file, path, "/wrench_error", count);
-  const auto split = whole("/split");
-  const auto object = whole("/object");
-  const std::vector<std::string> names = file.read_texts("/object_name");
-  const auto unit = static_cast<std::size_t>(block.unit);
-  for (std::size_t i = 0; i < count; ++i) {
-    if (split[i] < 0 || split[i] > 2) fail("{}: '/split' has a {}; allowed is 0 to 2", path.string(), split[i]);
-    if (object[i] < 0 || static_cast<std::size_t>(object[i]) >= names.size()) {
-      fail("{}: '/object' has a {}; there are {} objects", path.string(), object[i], names.size());
-    }
-    ++splits[unit][static_cast<std::size_t>(split[i])];
-    objects[unit].insert(names[static_cast<std::size_t>(object[i])]);
-    samples[i].scene = block.unit;
-    samples[i].frame = static_cast<int>(block.first_sample) + static_cast<int>(i);
-  }
-  set.samples.insert(set.samples.end(), samples.begin(), samples.end());
-}
-
 /// The device that a block carries; null if it can't be read back, as where it names files that aren't here.
 std::shared_ptr<const sim::DeviceSpec> device_in(const Hdf5Reader& file, const std::string& name) {
   try {
@@ -106,39 +78,7 @@ std::shared_ptr<const sim::DeviceSpec> device_in(const Hdf5Reader& file, const s
   }
 }
 
-void read_scenes(const Manifest& manifest, const ordered_json& json, InspectedSet& set) {
-  for (const ordered_json& unit : json.at("units")) {
-    InspectedScene scene;
-    scene.name = fmt::format("unit {}", unit.at("unit").get<int>());
-    for (const auto& [path, value] : unit.at("drawn").items()) scene.drawn.emplace_back(path, value.get<double>());
-    scene.first_sample = manifest.samples;
-    set.scenes.push_back(std::move(scene));
-  }
-  for (const ManifestBlock& block : manifest.blocks) {
-    if (block.unit < 0 || static_cast<std::size_t>(block.unit) >= set.scenes.size()) {
-      fail("{}: is of unit {}; there are {}", block.name, block.unit, set.scenes.size());
-    }
-    InspectedScene& scene = set.scenes[static_cast<std::size_t>(block.unit)];
-    scene.first_sample = std::min(scene.first_sample, block.first_sample);
-    scene.samples += block.samples;
-    if (scene.light.empty()) {
-      const fs::path path = set.folder / block.name;
-      const Hdf5Reader file(path);
-      scene.device_spec = device_in(file, path.string());
-      if (scene.device_spec) scene.device = scene.device_spec->name;
-      for (const char* output : {"frame", "height", "contact", "bead_displacement", "marker_displacement", "traction",
-                                 "events", "statistics"}) {
-        if (file.has(output)) scene.outputs.emplace_back(output);
-      }
-      scene.light.emplace_back(file.text_attribute("/", "light"), 0);
-    }
-    scene.light.front().second += block.samples;
-  }
-}
-
-void read_arrays(InspectedSet& set) {
-  if (set.blocks.empty()) return;
-  const Hdf5Reader file(set.folder / set.blocks.front().name);
+void read_arrays(const Hdf5Reader& file, InspectedSet& set) {
   for (const char* name : {"frame",
                            "height",
                            "contact",
@@ -174,6 +114,71 @@ void read_arrays(InspectedSet& set) {
   }
 }
 
+/// What each block of a sensor says of it.
+void describe(const Hdf5Reader& file, const std::string& name, InspectedScene& scene) {
+  scene.device_spec = device_in(file, name);
+  if (scene.device_spec) scene.device = scene.device_spec->name;
+  for (const char* output :
+       {"frame", "height", "contact", "bead_displacement", "marker_displacement", "traction", "events", "statistics"}) {
+    if (file.has(output)) scene.outputs.emplace_back(output);
+  }
+  scene.light.emplace_back(file.text_attribute("/", "light"), 0);
+}
+
+/// Also walks through the pictures that are read later.
+void read_block(const ManifestBlock& block, InspectedSet& set, std::vector<std::array<std::int64_t, 3>>& splits,
+                std::vector<std::set<std::string>>& objects) {
+  const fs::path path = set.folder / block.name;
+  const Hdf5Reader file(path);
+  InspectedScene& scene = set.scenes[static_cast<std::size_t>(block.unit)];
+  if (scene.light.empty()) describe(file, path.string(), scene);
+  scene.light.front().second += block.samples;
+  if (set.arrays.empty()) read_arrays(file, set);
+  for (const char* picture : {"/frame", "/height", "/contact"}) {
+    if (file.has(picture)) file.walk_rows(picture);
+  }
+  const auto count = static_cast<std::size_t>(block.samples);
+  const auto whole = [&](const char* name) {
+    auto values = file.read<std::int32_t>(name).values;
+    if (values.size() != count) fail("{}: '{}' has another shape than it should", path.string(), name);
+    return values;
+  };
+  std::vector<InspectedSample> samples = read_sample_columns(file, path, "/wrench_error", count);
+  const auto split = whole("/split");
+  const auto object = whole("/object");
+  const std::vector<std::string> names = file.read_texts("/object_name");
+  const auto unit = static_cast<std::size_t>(block.unit);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (split[i] < 0 || split[i] > 2) fail("{}: '/split' has a {}; allowed is 0 to 2", path.string(), split[i]);
+    if (object[i] < 0 || static_cast<std::size_t>(object[i]) >= names.size()) {
+      fail("{}: '/object' has a {}; there are {} objects", path.string(), object[i], names.size());
+    }
+    ++splits[unit][static_cast<std::size_t>(split[i])];
+    objects[unit].insert(names[static_cast<std::size_t>(object[i])]);
+    samples[i].scene = block.unit;
+    samples[i].frame = static_cast<int>(block.first_sample) + static_cast<int>(i);
+  }
+  set.samples.insert(set.samples.end(), samples.begin(), samples.end());
+}
+
+void read_scenes(const Manifest& manifest, const ordered_json& json, InspectedSet& set) {
+  for (const ordered_json& unit : json.at("units")) {
+    InspectedScene scene;
+    scene.name = fmt::format("unit {}", unit.at("unit").get<int>());
+    for (const auto& [path, value] : unit.at("drawn").items()) scene.drawn.emplace_back(path, value.get<double>());
+    scene.first_sample = manifest.samples;
+    set.scenes.push_back(std::move(scene));
+  }
+  for (const ManifestBlock& block : manifest.blocks) {
+    if (block.unit < 0 || static_cast<std::size_t>(block.unit) >= set.scenes.size()) {
+      fail("{}: is of unit {}; there are {}", block.name, block.unit, set.scenes.size());
+    }
+    InspectedScene& scene = set.scenes[static_cast<std::size_t>(block.unit)];
+    scene.first_sample = std::min(scene.first_sample, block.first_sample);
+    scene.samples += block.samples;
+  }
+}
+
 }  // namespace
 
 void read_drawn_samples(const Manifest& manifest, InspectedSet& set) {
@@ -189,8 +194,7 @@ void read_drawn_samples(const Manifest& manifest, InspectedSet& set) {
   std::vector<std::array<std::int64_t, 3>> splits(set.scenes.size(), {0, 0, 0});
   std::vector<std::set<std::string>> objects(set.scenes.size());
   for (const ManifestBlock& block : set.blocks) {
-    try_hdf5(set.folder / block.name, [&] { read_block(block, set, splits, objects); });
-    read_block(block, set, splits, objects);
+    read_hdf5(set.folder / block.name, [&] { read_block(block, set, splits, objects); });
   }
   for (std::size_t k = 0; k < set.scenes.size(); ++k) {
     for (std::size_t s = 0; s < splits[k].size(); ++s) {
@@ -200,7 +204,6 @@ void read_drawn_samples(const Manifest& manifest, InspectedSet& set) {
     }
     set.scenes[k].object = fmt::format("{}", fmt::join(objects[k], ", "));
   }
-  read_arrays(set);
 }
 
 cv::Mat drawn_frame(const InspectedSet& set, std::size_t sample) {

@@ -73,17 +73,17 @@ std::vector<double> column(const Hdf5Reader& file, const std::filesystem::path& 
   return values;
 }
 
+/// Also walks through what read_inspected_gel reads later.
 void read_columns(const std::filesystem::path& path, InspectedSet& set) {
-  const TruthTable table = read_truth_table(path);
+  const Hdf5Reader file(path);
+  const TruthTable table = truth_table_in(file, path);
   const std::size_t count = table.t_us.size();
-  std::vector<double> displacement_error;
-  const auto read = [&] {
-    const Hdf5Reader file(path);
-    displacement_error = column(file, path, "/error/displacement_mm", 1, count);
-    set.samples = read_sample_columns(file, path, "/error/force_N", count);
-  };
-  try_hdf5(path, read);
-  read();
+  const auto displacement_error = column(file, path, "/error/displacement_mm", 1, count);
+  set.samples = read_sample_columns(file, path, "/error/force_N", count);
+  for (const char* of_gel : {"/gel_vertices_mm", "/gel_triangles", "/surface_displacement_mm", "/contact",
+                             "/bead_rest_mm", "/bead_displacement_mm"}) {
+    if (file.has(of_gel)) file.walk_rows(of_gel);
+  }
   for (std::size_t i = 0; i < count; ++i) {
     set.samples[i].scene = table.scene[i];
     set.samples[i].frame = table.frame[i];
@@ -172,7 +172,8 @@ InspectedSet read_inspected_set(const std::filesystem::path& folder) {
     return set;
   }
   read_more(folder / "dataset.json", set);
-  read_columns(folder / "truth.h5", set);
+  const std::filesystem::path truth = folder / "truth.h5";
+  read_hdf5(truth, [&] { read_columns(truth, set); });
   if (static_cast<std::int64_t>(set.samples.size()) != manifest.samples) {
     fail("{}: truth.h5 has {} samples, dataset.json {}", folder.string(), set.samples.size(), manifest.samples);
   }

@@ -354,8 +354,7 @@ BlockState state_of_block(const fs::path& out, const std::string& identity, cons
 
 BlockColumns read_block_columns(const fs::path& out, const DrawnBlock& block) {
   const fs::path path = out / block_name(block);
-  try_hdf5(path, [&] { columns_in(path, block.samples); });
-  return columns_in(path, block.samples);
+  return read_hdf5(path, [&] { return columns_in(path, block.samples); });
 }
 
 }  // namespace touchstone::datasets

@@ -37,36 +37,6 @@ std::vector<double> flat(const std::vector<Eigen::Vector3d>& points) {
   return values;
 }
 
-TruthTable table_in(const std::filesystem::path& path) {
-  const Hdf5Reader file(path);
-  if (file.text_attribute("/", "format") != kFormat) fail("{}: isn't a truth file", path.string());
-  const std::int64_t version = file.integer_attribute("/", "format_version");
-  if (version != kFormatVersion) {
-    fail("{}: has format version {}; this program reads {}", path.string(), version, kFormatVersion);
-  }
-  TruthTable table;
-  table.scene_names = file.read_texts("/scene_name");
-  table.t_us = file.read<std::int64_t>("/t_us").values;
-  const auto scene = file.read<std::int32_t>("/scene").values;
-  const auto split = file.read<std::uint8_t>("/split").values;
-  const auto frame = file.read<std::int32_t>("/frame").values;
-  const auto wrench = file.read<double>("/wrench").values;
-  const std::size_t samples = table.t_us.size();
-  if (scene.size() != samples || split.size() != samples || frame.size() != samples || wrench.size() != 6 * samples) {
-    fail("{}: its columns aren't of one length", path.string());
-  }
-  for (std::size_t i = 0; i < samples; ++i) {
-    if (scene[i] < 0 || scene[i] >= static_cast<int>(table.scene_names.size()) || split[i] > 2) {
-      fail("{}: sample {} has scene {} and split {}, which there aren't", path.string(), i, scene[i], split[i]);
-    }
-    table.scene.push_back(scene[i]);
-    table.split.push_back(static_cast<Split>(split[i]));
-    table.frame.push_back(frame[i]);
-    table.wrench.push_back(Eigen::Map<const Eigen::Matrix<double, 6, 1>>(wrench.data() + 6 * i));
-  }
-  return table;
-}
-
 }  // namespace
 
 struct TruthFileWriter::Parts {
@@ -260,9 +230,37 @@ const std::vector<ArrayShape>& TruthFileWriter::arrays() const {
   return parts_->arrays;
 }
 
+TruthTable truth_table_in(const Hdf5Reader& file, const std::filesystem::path& path) {
+  if (file.text_attribute("/", "format") != kFormat) fail("{}: isn't a truth file", path.string());
+  const std::int64_t version = file.integer_attribute("/", "format_version");
+  if (version != kFormatVersion) {
+    fail("{}: has format version {}; this program reads {}", path.string(), version, kFormatVersion);
+  }
+  TruthTable table;
+  table.scene_names = file.read_texts("/scene_name");
+  table.t_us = file.read<std::int64_t>("/t_us").values;
+  const auto scene = file.read<std::int32_t>("/scene").values;
+  const auto split = file.read<std::uint8_t>("/split").values;
+  const auto frame = file.read<std::int32_t>("/frame").values;
+  const auto wrench = file.read<double>("/wrench").values;
+  const std::size_t samples = table.t_us.size();
+  if (scene.size() != samples || split.size() != samples || frame.size() != samples || wrench.size() != 6 * samples) {
+    fail("{}: its columns aren't of one length", path.string());
+  }
+  for (std::size_t i = 0; i < samples; ++i) {
+    if (scene[i] < 0 || scene[i] >= static_cast<int>(table.scene_names.size()) || split[i] > 2) {
+      fail("{}: sample {} has scene {} and split {}, which there aren't", path.string(), i, scene[i], split[i]);
+    }
+    table.scene.push_back(scene[i]);
+    table.split.push_back(static_cast<Split>(split[i]));
+    table.frame.push_back(frame[i]);
+    table.wrench.push_back(Eigen::Map<const Eigen::Matrix<double, 6, 1>>(wrench.data() + 6 * i));
+  }
+  return table;
+}
+
 TruthTable read_truth_table(const std::filesystem::path& path) {
-  try_hdf5(path, [&path] { table_in(path); });
-  return table_in(path);
+  return read_hdf5(path, [&path] { return truth_table_in(Hdf5Reader(path), path); });
 }
 
 }  // namespace touchstone::datasets

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/hdf5_file.h"
 #include "datasets/jobs/job.h"
 #include "datasets/jobs/split.h"
 #include "fem/elements/compliance.h"
@@ -68,5 +69,7 @@ struct TruthTable {
 
 /// @throws Error if the file isn't a truth file, or is broken
 TruthTable read_truth_table(const std::filesystem::path& file);
+/// The same of a file that is open, for use within read_hdf5. Errors name `path`.
+TruthTable truth_table_in(const Hdf5Reader& file, const std::filesystem::path& path);
 
 }  // namespace touchstone::datasets

@@ -1,30 +1,17 @@
 #pragma once
 // The folder of a fit: whose it is, and what of a fit that was broken off is kept in it.
 
-#include <Eigen/Core>
-#include <cstddef>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "datasets/sets/folder_lock.h"
 #include "datasets/sets/run_identity.h"
-#include "lab/fit/bounded_least_squares.h"
+#include "lab/fit/fit_so_far.h"
 #include "lab/fit/unit_fit_spec.h"
-#include "lab/fit/unit_simulation.h"
 
 namespace touchstone::lab {
-
-/// All that a fit has found out so far, and that would take long to find out again.
-struct FitSoFar {
-  LeastSquaresState search;
-  std::size_t level = 0;            ///< of UnitFitSpec::field_accuracy
-  int steps_before = 0;             ///< of coarser ones
-  Eigen::VectorXd before;           ///< residuals where the fit begins
-  std::vector<PressPose> labelled;  ///< labelled_poses
-};
 
 /// What a fit's result depends on: its file, all files that this names, and the pictures of its recording.
 datasets::RunIdentity identity_of_fit(const std::filesystem::path& file, const std::optional<RecordingSpec>& recording);

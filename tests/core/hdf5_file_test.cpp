@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <thread>
 
@@ -110,6 +111,34 @@ TEST(Hdf5File, SaysWhatItCantRead) {
   EXPECT_THROW(reader.text_attribute("/field", "none"), Error);
 }
 
+TEST(Hdf5File, AWalkFindsAFirstRowThatIsDamaged) {
+  const test::TemporaryFolder folder;
+  constexpr int kValues = 4096;
+  std::vector<float> row(kValues);
+  for (int k = 0; k < kValues; ++k) row[static_cast<std::size_t>(k)] = std::sin(static_cast<float>(k * k));
+  const auto packed = pack_hdf5_row(row.data(), row.size() * sizeof(float), sizeof(float));
+  {
+    Hdf5Writer writer(folder.path() / "a.h5");
+    writer.add_packed_rows<float>({"/rows", "mm", "samples x values", "", "Numbers."}, 1, {kValues});
+    writer.write_packed_row("/rows", 0, packed);
+    writer.write<float>({"/nothing", "mm", "samples x values", "", "None."}, 0, {kValues}, {});
+    writer.write_texts({"/names", "1", "names", "", "Names."}, {"one"});
+    writer.close();
+  }
+  const Hdf5Reader whole(folder.path() / "a.h5");
+  EXPECT_NO_THROW(whole.walk_rows("/rows"));
+  EXPECT_NO_THROW(whole.walk_rows("/nothing"));
+  EXPECT_THROW(whole.walk_rows("/none"), Error);
+  EXPECT_THROW(whole.walk_rows("/names"), Error);
+  std::string bytes = read_whole_file(folder.path() / "a.h5");
+  const std::size_t at = bytes.find(std::string(packed.begin(), packed.end()));
+  ASSERT_NE(at, std::string::npos);
+  constexpr std::size_t kDamaged = 64;
+  bytes.replace(at + packed.size() / 2, kDamaged, kDamaged, '\xff');
+  const Hdf5Reader damaged(folder.write("b.h5", bytes));
+  EXPECT_THROW(damaged.walk_rows("/rows"), Error);
+}
+
 TEST(Hdf5File, ListsOfWholeNumbersAreReadInParts) {
   const test::TemporaryFolder folder;
   {
@@ -155,6 +184,13 @@ TEST(Hdf5Trial, AnErrorComesAsItIsAndNothingOfASuccess) {
   bool read = false;
   try_hdf5("a.h5", [&read] { read = true; });
   EXPECT_FALSE(read);
+}
+
+TEST(Hdf5Trial, WhatIsReadAfterItsTrialComesBack) {
+  int calls = 0;  // of this process
+  EXPECT_EQ(read_hdf5("a.h5", [&calls] { return ++calls; }), 1);
+  EXPECT_THROW(read_hdf5("a.h5", [&calls]() -> int { throw Error(std::to_string(++calls)); }), Error);
+  EXPECT_EQ(calls, 1) << "what fails in its trial isn't called again";
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include "datasets/sets/block_file.h"
 #include "datasets/sets/truth_file.h"
 #include "fem/elements/compliance_file.h"
+#include "lab/fit/fit_so_far.h"
 #include "sensors/beads/stiffness_model_file.h"
 #include "sensors/colour/hue_model_file.h"
 #include "sensors/events/event_file.h"
@@ -31,6 +32,7 @@
 #include "sim/files/image_file.h"
 #include "sim/press/press_path_file.h"
 #include "sim/sensor/light_file.h"
+#include "sim/sensor/traced_slab.h"
 #include "tests/support/small_light.h"
 
 namespace touchstone::fuzz {
@@ -259,11 +261,33 @@ fem::PressState press() {
   return state;
 }
 
+/// A picture of 2 x 1 pixels and one band.
+sim::TracedSlab milky_slab() {
+  sim::TracedSlab slab;
+  slab.rest = cv::Mat(1, 2, CV_32FC1, cv::Scalar(0.5));
+  slab.shares = {std::vector<double>(std::size(sim::kFlatStates), 0.5)};
+  return slab;
+}
+
+/// Two unknowns and three residuals.
+lab::KeptFit fit() {
+  lab::KeptFit kept;
+  kept.so_far.search.x = Eigen::Vector2d(0.5, 0.25);
+  kept.so_far.search.residuals = Eigen::Vector3d(1.0, 0.5, 0.25);
+  kept.so_far.search.jacobian = Eigen::MatrixXd::Constant(3, 2, 0.5);
+  kept.so_far.before = kept.so_far.search.residuals;
+  kept.so_far.labelled = {{{0.5, -0.5}, 0.25}};
+  return kept;
+}
+
 void write_set_up_results(const std::filesystem::path& corpus) {
   fem::write_compliance(corpus / "whole.compliance", kKey, gel());
   fem::write_compliance(corpus / "compressed.compliance", kKey, compressed_gel());
   sim::write_light(corpus, kKey, light());
   std::filesystem::rename(sim::light_file(corpus, kKey), corpus / "light.bin");
+  sim::write_traced(corpus, kKey, milky_slab());
+  std::filesystem::rename(sim::light_file(corpus, kKey), corpus / "milky-slab.bin");
+  write_whole_file(corpus / "fit.bin", lab::kept_fit(fit()));
   sim::write_press_path(corpus / "press-path.bin", kKey, {.at = {0.0}, .states = {press()}, .stopped = "", .note = ""});
   // As fem/vibration/vibration_cache.cpp writes them: frequency, surface, beads, effective mass, mass.
   write_whole_file(corpus / "vibration.bin",

@@ -1,21 +1,25 @@
-// What a set-up found and keeps on disk: a gel's compliance and vibration, a sensor's light, played presses. Whoever
-// may write into the folder can seal a file as the program does, so keys and checksums, which no chance gets right, are
-// made anew for a second try. What is read is used as the program uses it.
+// What a set-up found and keeps on disk: a gel's compliance and vibration, a sensor's light, a milky slab's, played
+// presses; and what is kept of a fit that was broken off. Whoever may write into the folder can seal a file as the
+// program does, so keys and checksums, which no chance gets right, are made anew for a second try. What is read is used
+// as the program uses it.
 
 #include <xxhash.h>
 
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <iterator>
 #include <numeric>
 #include <string>
 
 #include "core/sha256.h"
 #include "fem/elements/compliance_file.h"
 #include "fem/vibration/vibration_cache.h"
+#include "lab/fit/fit_so_far.h"
 #include "render/direct/light_field.h"
 #include "sim/press/press_path_file.h"
 #include "sim/sensor/light_file.h"
+#include "sim/sensor/traced_slab.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/scratch_file.h"
 
@@ -88,6 +92,23 @@ bool reads_light(const std::string& bytes) {
   return true;
 }
 
+bool reads_traced(const std::string& bytes) {
+  const fs::path file = scratch_file(bytes, "light-" + kKey + ".bin");
+  const auto traced = sim::read_traced(file.parent_path(), kKey);
+  if (!traced) return false;
+  TS_ASSERT(std::ssize(traced->shares) == traced->rest.channels());
+  for (const std::vector<double>& band : traced->shares) TS_ASSERT(band.size() == std::size(sim::kFlatStates));
+  return true;
+}
+
+bool reads_fit(const std::string& bytes) {
+  return gives_result([&] {
+    const lab::KeptFit kept = lab::kept_fit_in(bytes, "fit.bin");
+    TS_ASSERT(kept.so_far.search.x.allFinite() && kept.so_far.search.growth >= 2.0);
+    for (const lab::PressPose& pose : kept.so_far.labelled) TS_ASSERT(std::isfinite(pose.depth_mm));
+  });
+}
+
 bool reads_presses(const std::string& bytes) {
   const fs::path file = scratch_file(bytes, "press-path.bin");
   return gives_result([&] {
@@ -120,6 +141,8 @@ struct Modes {
 bool any_reads(const std::string& bytes, const Modes& modes) {
   if (bytes.starts_with("TSCOMPLY")) return reads_gel(bytes);
   if (bytes.starts_with("TSLIGHT")) return reads_light(bytes);
+  if (bytes.starts_with("TSMILKY")) return reads_traced(bytes);
+  if (bytes.starts_with("TSFIT")) return reads_fit(bytes);
   if (bytes.starts_with("TSVIBRAT")) return modes.reads(bytes);
   return reads_presses(bytes);
 }
@@ -129,10 +152,10 @@ bool any_reads(const std::string& bytes, const Modes& modes) {
 bool reads(std::string_view bytes) {
   static const Modes modes;
   const std::string given(bytes);
+  static const std::string fit_key = lab::kept_fit({}).substr(kMarkSize, kKeySize);
   const bool as_given = any_reads(given, modes);
-  const std::string sealed = given.starts_with("TSCOMPLY")
-                                 ? sealed_gel(given)
-                                 : sealed_matrices(given, given.starts_with("TSVIBRAT") ? modes.key : kKey);
+  const std::string& key = given.starts_with("TSVIBRAT") ? modes.key : given.starts_with("TSFIT") ? fit_key : kKey;
+  const std::string sealed = given.starts_with("TSCOMPLY") ? sealed_gel(given) : sealed_matrices(given, key);
   return (sealed != given && any_reads(sealed, modes)) || as_given;
 }
 
