@@ -16,8 +16,68 @@ constexpr double kSpareReachMm = 0.05;  // and for what is laid onto a body
 constexpr double kRounding_mm = 1e-9;   // of a rim that lies on the plate, as the box ends there
 constexpr int kPathsToMeasure = 256;    // a pixel, for a standard error of a tenth of a percent
 
-/// What reflects nothing needs no light: it may stand outside of the light field.
-render::Scene with_blacks(render::Scene scene) {
+constexpr double kCells = 48.0;     // that luminous rectangles are cut into, all together: as many beams
+constexpr double kWideCell = 0.06;  // of a lamp's distance from the gel's middle: smaller cells are of no use
+constexpr double kGrowth = 1.05;    // of the cells, until they are few enough
+
+/// A luminous rectangle's cells along its width and height, of `side` mm at most.
+Eigen::Array2i cells_of(const render::AreaLamp& lamp, double side) {
+  side = std::max(side, kWideCell * lamp.centre.norm());
+  return Eigen::Array2d(lamp.width / side, lamp.height / side).ceil().cast<int>().max(1);
+}
+
+/// One lamp is one beam to the light field, and a facet sees all of a beam or nothing: under a wide luminous rectangle
+/// light would end at a line where it fades. So wide ones are cut into cells.
+void cut_wide_lamps(std::vector<render::Lamp>& lamps) {
+  double side = 0.0;  // mm
+  int others = 0;
+  for (const render::Lamp& lamp : lamps) {
+    if (std::holds_alternative<render::GuideLamp>(lamp)) return;  // they are cut into beams as far as beams go
+    const auto* area = std::get_if<render::AreaLamp>(&lamp);
+    if (area == nullptr) {
+      ++others;
+    } else {
+      side = std::max(side, 0.02 * std::max(area->width, area->height));
+    }
+  }
+  if (side == 0.0) return;
+  const auto count = [&] {
+    double sum = others;
+    for (const render::Lamp& lamp : lamps) {
+      if (const auto* area = std::get_if<render::AreaLamp>(&lamp)) sum += cells_of(*area, side).cast<double>().prod();
+    }
+    return sum;
+  };
+  // As many lamps as there are is the least that this comes to.
+  while (count() > std::max(kCells, static_cast<double>(lamps.size()))) side *= kGrowth;
+  std::vector<render::Lamp> cut;
+  for (const render::Lamp& lamp : lamps) {
+    const auto* area = std::get_if<render::AreaLamp>(&lamp);
+    if (area == nullptr) {
+      cut.push_back(lamp);
+      continue;
+    }
+    const Eigen::Array2i cells = cells_of(*area, side);
+    const Eigen::Vector3d out = area->direction.normalized();
+    const Eigen::Vector3d across = (area->along - area->along.dot(out) * out).normalized();
+    render::AreaLamp cell = *area;
+    cell.width /= cells.x();
+    cell.height /= cells.y();
+    cell.power_W /= static_cast<double>(cells.prod());
+    for (int row = 0; row < cells.y(); ++row) {
+      for (int column = 0; column < cells.x(); ++column) {
+        cell.centre = area->centre + (column - 0.5 * (cells.x() - 1)) * cell.width * across +
+                      (row - 0.5 * (cells.y() - 1)) * cell.height * out.cross(across);
+        cut.emplace_back(cell);
+      }
+    }
+  }
+  lamps = std::move(cut);
+}
+
+/// What reflects nothing needs no light: it may stand outside of the light field. Wide lamps are cut.
+render::Scene for_direct_light(render::Scene scene) {
+  cut_wide_lamps(scene.lamps);
   for (render::Surface& surface : scene.surfaces) {
     const auto* matt = std::get_if<render::Lambertian>(&surface.material);
     if (matt != nullptr && !surface.print && (matt->albedo == 0.0).all()) surface.material = render::Black{};
@@ -88,9 +148,9 @@ DirectLight::DirectLight(const SceneView& view, const render::Camera& camera, st
   const SceneSpec& scene = view.scene;
   const bool forced = scene.effects.direct_light == Switch::on;
   const fem::PressState still = at_rest(truths.front().press);
-  const render::Scene rest = with_blacks(view.seen(still, {}));
+  const render::Scene rest = for_direct_light(view.seen(still, {}));
   const Truth& judged = deepest(truths);
-  const render::Scene pressed = with_blacks(view.seen(judged.press, view.relief(judged.press)));
+  const render::Scene pressed = for_direct_light(view.seen(judged.press, view.relief(judged.press)));
   render::DirectChoiceSettings settings;
   settings.tolerance = scene.light.direct_tolerance;
   settings.direct.edge_side = edge_side;
@@ -134,7 +194,7 @@ DirectLight::DirectLight(const SceneView& view, const render::Camera& camera, co
   settings_.samples = found.rays;
   settings_.edge_side = edge_side;
   settings_.seed = view.scene.seed;
-  rest_ = with_blacks(view.seen(still, {}));
+  rest_ = for_direct_light(view.seen(still, {}));
   field_.fixture = rest_;
   field_.fixture.surfaces.clear();
   field_.fixture.balls.clear();
@@ -190,14 +250,14 @@ auto DirectLight::with_renderer(const Work& work) const {
 
 std::optional<render::DirectImage> DirectLight::render(render::Scene scene) const {
   TS_ASSERT(choice_.direct);
-  const render::Scene direct = with_blacks(std::move(scene));
+  const render::Scene direct = for_direct_light(std::move(scene));
   if (!is_within_reach(direct)) return std::nullopt;
   return with_renderer([&](render::DirectRenderer& renderer) { return renderer.render(direct); });
 }
 
 std::optional<render::SheetPoints> DirectLight::points(const render::Scene& scene) const {
   TS_ASSERT(has_points());
-  const render::Scene direct = with_blacks(scene);
+  const render::Scene direct = for_direct_light(scene);
   if (!is_within_reach(direct)) return std::nullopt;
   return with_renderer([&](render::DirectRenderer& renderer) { return renderer.sheet_points(direct); });
 }

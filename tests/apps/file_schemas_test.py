@@ -33,7 +33,7 @@ ONLY_READERS = [
         r"print\.radius_mm", r"pins\.tip_mm", "edge_radius_mm", r"scales\[0\]\.width_mm", "soft_angle_deg", "threshold_spread", "valley_mm",
         "emboss_width_mm", "window_apart_mm", "window_from_mouth_mm")),
     # the device as a whole
-    r"gel: the (slab|dome|fingertip)", r"beads: a grid", r"beads.depth_mm: \S+ puts beads",
+    r"gel: the (slab|dome|fingertip)", r"gel\.frame: clear is for coated gels", r"beads: a grid", r"beads.depth_mm: \S+ puts beads",
     r"pins(\.\w+)?: (\S+ (rings|is longer|lets)|stand on|the (coating|gel)|a first ring)",
     r"is not in front of the plate", r"is the lamp's own position", r"is longer than a frame",
     r"the camera has no direction", r"mm from the camera; allowed is at most",

@@ -61,8 +61,8 @@ TEST_F(HeightModelFile, FieldsAreChecked) {
               ThrowsMessage<Error>(HasSubstr("'mm_per_pixel' isn't known (did you mean 'mm_per_px'?)")));
   EXPECT_THAT(reading(replaced("\"mm_per_px\":0.053", "\"mm_per_px\":-0.053")),
               ThrowsMessage<Error>(HasSubstr("mm_per_px is -0.053")));
-  EXPECT_THAT(reading(replaced("\"version\":4", "\"version\":5")), ThrowsMessage<Error>(HasSubstr("version")));
-  EXPECT_THAT(reading(replaced("\"version\":4", "\"version\":3")), ThrowsMessage<Error>(HasSubstr("calibrate again")));
+  EXPECT_THAT(reading(replaced("\"version\":5", "\"version\":6")), ThrowsMessage<Error>(HasSubstr("version")));
+  EXPECT_THAT(reading(replaced("\"version\":5", "\"version\":4")), ThrowsMessage<Error>(HasSubstr("calibrate again")));
   EXPECT_THAT(reading(replaced("\"lamp_columns\":8", "\"lamp_columns\":7")), ThrowsMessage<Error>(HasSubstr("lamps")));
   EXPECT_THAT(reading(replaced("\"width_px\":120", "\"width_px\":121")),
               ThrowsMessage<Error>(HasSubstr("bytes after its first line")));

@@ -185,6 +185,18 @@ TEST(DirectLight, ACoatIsTranslucentWhereThatIsSeen) {
   EXPECT_FALSE(make_plan(luminous).translucent_coating);
 }
 
+// One beam for all of a lamp of 14 mm ends its light at a line where it fades.
+TEST(DirectLight, AWideLampsLightFadesOnAFlank) {
+  const SceneSpec scene = scene_of(kMatt, "", R"(
+  - {type: area, position_mm: [-9, 0, -6], target_mm: [0, 0, 0], size_mm: [14, 3], along: [0, 1, 0], power_W: [1, 0.5, 0.2]}
+  - {type: area, position_mm: [0, 11, -9], target_mm: [0, 0, 0], size_mm: [8, 8], power_W: [0.2, 0.5, 1]}
+)",
+                                   ", frame: clear");
+  const Seen seen = see(scene);
+  ASSERT_TRUE(seen.camera->light_choice().direct) << seen.camera->light_choice().reason;
+  EXPECT_LT(off_paths(seen.last().radiance, traced_twice(scene, 2)), 0.006) << "as one beam each: 0.0094";
+}
+
 // LEDs beside the pad, as deep as it: what is painted round it hides them.
 TEST(DirectLight, LightComesInThroughClearSides) {
   const std::string leds = R"(
