@@ -301,9 +301,7 @@ double clearance(const Lamp& lamp, const Eigen::AlignedBox3d& box) {
   if (area == nullptr) return box.exteriorDistance(lamp_position(lamp)) - lamp_extent(lamp);
   constexpr int kMostSteps = 1000;
   constexpr double kTouching = 1e-3;  // mm; converging slowly where they touch, steps end above 0
-  const Eigen::Vector3d out = area->direction.normalized();
-  const Eigen::Vector3d across = (area->along - area->along.dot(out) * out).normalized();
-  const Eigen::Vector3d up = out.cross(across);
+  const auto [across, up] = sides_of(*area);
   Eigen::Vector3d place = area->centre;
   for (int step = 0; step < kMostSteps; ++step) {
     const Eigen::Vector3d from_centre = nearest_in(box, place) - area->centre;

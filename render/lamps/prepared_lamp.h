@@ -91,8 +91,9 @@ PreparedLamp<N> prepare_lamp(const Lamp& lamp, const std::vector<FlatFace>& face
     PreparedLamp<N> made = with_axis(area->direction);
     made.kind = LampKind::kLobe;
     made.exponent = lobe_exponent(area->half_power_angle);
-    made.frame.x = (area->along - area->along.dot(made.frame.z) * made.frame.z).normalized();
-    made.frame.y = made.frame.z.cross(made.frame.x);
+    const RectangleSides sides = sides_of(*area);
+    made.frame.x = sides.across;
+    made.frame.y = sides.up;
     made.half_width = 0.5 * area->width;
     made.half_height = 0.5 * area->height;
     made.area = area->width * area->height;

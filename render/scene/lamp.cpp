@@ -170,9 +170,8 @@ void check(const AreaLamp& lamp, const std::vector<FlatFace>& faces, const std::
   check_length(lamp.width, "width", what);
   check_length(lamp.height, "height", what);
   check_lobe(lamp.half_power_angle, lamp.visible, what);
-  const Eigen::Vector3d normal = lamp.direction.normalized();
-  const Eigen::Vector3d along = (lamp.along - lamp.along.dot(normal) * normal).normalized();
-  const double rise = 0.5 * (lamp.width * std::abs(along.z()) + lamp.height * std::abs(normal.cross(along).z()));
+  const RectangleSides sides = sides_of(lamp);
+  const double rise = 0.5 * (lamp.width * std::abs(sides.across.z()) + lamp.height * std::abs(sides.up.z()));
   check_in_one_layer(lamp.centre.z(), rise, faces, what);
 }
 
@@ -258,6 +257,12 @@ const Eigen::Vector3d& lamp_position(const Lamp& lamp) {
 
 const Spectrum& lamp_power(const Lamp& lamp) {
   return std::visit([](const auto& one) -> const Spectrum& { return one.power_W; }, lamp);
+}
+
+RectangleSides sides_of(const AreaLamp& lamp) {
+  const Eigen::Vector3d out = lamp.direction.normalized();
+  const Eigen::Vector3d across = (lamp.along - lamp.along.dot(out) * out).normalized();
+  return {across, out.cross(across)};
 }
 
 double lamp_extent(const Lamp& lamp) {

@@ -136,6 +136,12 @@ const Eigen::Vector3d& lamp_position(const Lamp& lamp);
 /// What it sends into its medium, W in each band.
 const Spectrum& lamp_power(const Lamp& lamp);
 
+/// The directions of a luminous rectangle's width and height: unit, square to each other and to the way it shines.
+struct RectangleSides {
+  Eigen::Vector3d across, up;
+};
+RectangleSides sides_of(const AreaLamp& lamp);  ///< @pre `along` isn't along `direction`
+
 /// How far it reaches from its middle; 0 for a point, and for a guide, whose end stands inside its plate.
 double lamp_extent(const Lamp& lamp);
 

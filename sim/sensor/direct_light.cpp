@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "render/direct/wide_lamps.h"
 #include "render/scene/film_screen.h"
 #include "sim/scene/device_gel.h"
 
@@ -16,68 +17,9 @@ constexpr double kSpareReachMm = 0.05;  // and for what is laid onto a body
 constexpr double kRounding_mm = 1e-9;   // of a rim that lies on the plate, as the box ends there
 constexpr int kPathsToMeasure = 256;    // a pixel, for a standard error of a tenth of a percent
 
-constexpr double kCells = 48.0;     // that luminous rectangles are cut into, all together: as many beams
-constexpr double kWideCell = 0.06;  // of a lamp's distance from the gel's middle: smaller cells are of no use
-constexpr double kGrowth = 1.05;    // of the cells, until they are few enough
-
-/// A luminous rectangle's cells along its width and height, of `side` mm at most.
-Eigen::Array2i cells_of(const render::AreaLamp& lamp, double side) {
-  side = std::max(side, kWideCell * lamp.centre.norm());
-  return Eigen::Array2d(lamp.width / side, lamp.height / side).ceil().cast<int>().max(1);
-}
-
-/// One lamp is one beam to the light field, and a facet sees all of a beam or nothing: under a wide luminous rectangle
-/// light would end at a line where it fades. So wide ones are cut into cells.
-void cut_wide_lamps(std::vector<render::Lamp>& lamps) {
-  double side = 0.0;  // mm
-  int others = 0;
-  for (const render::Lamp& lamp : lamps) {
-    if (std::holds_alternative<render::GuideLamp>(lamp)) return;  // they are cut into beams as far as beams go
-    const auto* area = std::get_if<render::AreaLamp>(&lamp);
-    if (area == nullptr) {
-      ++others;
-    } else {
-      side = std::max(side, 0.02 * std::max(area->width, area->height));
-    }
-  }
-  if (side == 0.0) return;
-  const auto count = [&] {
-    double sum = others;
-    for (const render::Lamp& lamp : lamps) {
-      if (const auto* area = std::get_if<render::AreaLamp>(&lamp)) sum += cells_of(*area, side).cast<double>().prod();
-    }
-    return sum;
-  };
-  // As many lamps as there are is the least that this comes to.
-  while (count() > std::max(kCells, static_cast<double>(lamps.size()))) side *= kGrowth;
-  std::vector<render::Lamp> cut;
-  for (const render::Lamp& lamp : lamps) {
-    const auto* area = std::get_if<render::AreaLamp>(&lamp);
-    if (area == nullptr) {
-      cut.push_back(lamp);
-      continue;
-    }
-    const Eigen::Array2i cells = cells_of(*area, side);
-    const Eigen::Vector3d out = area->direction.normalized();
-    const Eigen::Vector3d across = (area->along - area->along.dot(out) * out).normalized();
-    render::AreaLamp cell = *area;
-    cell.width /= cells.x();
-    cell.height /= cells.y();
-    cell.power_W /= static_cast<double>(cells.prod());
-    for (int row = 0; row < cells.y(); ++row) {
-      for (int column = 0; column < cells.x(); ++column) {
-        cell.centre = area->centre + (column - 0.5 * (cells.x() - 1)) * cell.width * across +
-                      (row - 0.5 * (cells.y() - 1)) * cell.height * out.cross(across);
-        cut.emplace_back(cell);
-      }
-    }
-  }
-  lamps = std::move(cut);
-}
-
 /// What reflects nothing needs no light: it may stand outside of the light field. Wide lamps are cut.
 render::Scene for_direct_light(render::Scene scene) {
-  cut_wide_lamps(scene.lamps);
+  render::cut_wide_lamps(scene.lamps);
   for (render::Surface& surface : scene.surfaces) {
     const auto* matt = std::get_if<render::Lambertian>(&surface.material);
     if (matt != nullptr && !surface.print && (matt->albedo == 0.0).all()) surface.material = render::Black{};

@@ -119,15 +119,15 @@ render::Print print_of(const PrintSpec& spec, const GelSpec& gel, const SceneBan
   return print;
 }
 
-/// Colours the triangles of a translucent coat that lie on objects, under its print.
-void show_touched(const SceneSpec& scene, const SceneBands& bands, const GelSheet& sheet,
+/// Colours the triangles of a translucent coat that lie on objects, under its print. `colours`: of the objects.
+void show_touched(const std::vector<render::Spectrum>& colours, const GelSheet& sheet,
                   std::optional<render::Print>& print) {
   if (!print) {
     print.emplace();
     print->material_mm.assign(sheet.rest.size(), Eigen::Vector2d::Zero());
   }
   const auto first = static_cast<int>(print->inks.size());
-  for (render::Spectrum& touched : translucent_coat(scene, bands).touched) print->inks.push_back(std::move(touched));
+  print->inks.insert(print->inks.end(), colours.begin(), colours.end());
   print->ground.reserve(sheet.touched.size());
   for (const int body : sheet.touched) print->ground.push_back(body < 0 ? -1 : first + body);
 }
@@ -211,15 +211,16 @@ render::Surface coated_surface(const SceneSpec& scene, const Plan& plan, GelShee
   const SceneBands& bands = plan.bands;
   const CoatingSpec& coating = *device.coating;
   render::Surface out;
+  if (coating.print) out.print = print_of(*coating.print, device.gel, bands, sheet.rest);
   if (coating.type == CoatingType::metal) {
     out.material = render::RoughConductor{in_bands(coating.albedo, bands, "coating.reflectance"), coating.roughness};
   } else if (coating.transmittance.largest() > 0.0) {
-    out.material = render::Lambertian{translucent_coat(scene, bands).free};
+    const TranslucentCoat coat = translucent_coat(scene, bands);
+    out.material = render::Lambertian{coat.free};
+    if (plan.translucent_coating) show_touched(coat.touched, sheet, out.print);
   } else {
     out.material = render::Lambertian{in_bands(coating.albedo, bands, "coating.albedo")};
   }
-  if (coating.print) out.print = print_of(*coating.print, device.gel, bands, sheet.rest);
-  if (plan.translucent_coating) show_touched(scene, bands, sheet, out.print);
   out.normals = vertex_normals(sheet.mesh);
   out.mesh = std::move(sheet.mesh);
   // What is bonded there moves by some hundredths of a micrometre, as displacements are means over the mesh's hats; but
