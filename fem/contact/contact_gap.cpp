@@ -83,9 +83,12 @@ bool WeightedGap::overlap_cuts_after(double distance) const {
          });
 }
 
-WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shape,
-                         const RigidTransform& gel_from_object, const PatchMotion& lookup, GapReach asked, bool cut,
-                         std::shared_ptr<const CutHats> kept) {
+namespace {
+
+/// `deepest_only`: all else than `deepest` is left as it comes.
+WeightedGap gap_of(const ContactSurface& surface, const ContactShape& shape, const RigidTransform& gel_from_object,
+                   const PatchMotion& lookup, GapReach asked, bool cut, std::shared_ptr<const CutHats> kept,
+                   bool deepest_only) {
   const auto n = static_cast<Eigen::Index>(surface.vertices.size());
   WeightedGap result;
   result.plain = Eigen::VectorXd::Zero(n);
@@ -164,6 +167,7 @@ WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shap
         crossed.back().triangle = static_cast<int>(t);
       }
     }
+    if (deepest_only) return;
     // What the gel can't reach cuts nothing.
     const double reached = std::max(0.0, result.deepest) + kBulge * std::max(0.0, -result.deepest);
     std::erase_if(crossed, [&](const CrossedTriangle& t) {
@@ -194,6 +198,7 @@ WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shap
         }
       },
       shape);
+  if (deepest_only) return result;
   const double depth = std::max(0.0, -result.deepest);
   result.weighted = result.plain;
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -227,6 +232,20 @@ WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shap
     if (far) result.lowest[i] = kInfinity;
   }
   return result;
+}
+
+}  // namespace
+
+WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shape,
+                         const RigidTransform& gel_from_object, const PatchMotion& lookup, GapReach reach, bool cut,
+                         std::shared_ptr<const CutHats> kept) {
+  return gap_of(surface, shape, gel_from_object, lookup, reach, cut, std::move(kept), false);
+}
+
+double deepest_gap(const ContactSurface& surface, const ContactShape& shape, const RigidTransform& gel_from_object,
+                   bool cut) {
+  const GapReach nothing_beside = surface.flat ? GapReach{0.0, 0.0} : GapReach{};
+  return gap_of(surface, shape, gel_from_object, {}, nothing_beside, cut, nullptr, true).deepest;
 }
 
 }  // namespace touchstone::fem

@@ -116,15 +116,18 @@ class DensityPairs {
   DensityResponses sum(const std::vector<DensityTriangle>& triangles) {
     const double near2 = std::pow(kNear * edge_, 2);
     const double none_near2 = std::pow(kNoneNear * edge_, 2);
+    // By themselves, since most pairs aren't looked at further.
+    std::vector<Vector3d> middle;
     std::vector<char> is_cut;  // one of their corners' hats is
     for (const DensityTriangle& triangle : triangles) {
+      middle.push_back(triangle.middle);
       is_cut.push_back(std::any_of(triangle.place.begin(), triangle.place.end(),
                                    [&](int place) { return place >= 0 && of(place).is_cut; }));
     }
     for (std::size_t a = 0; a < triangles.size(); ++a) {
       for (std::size_t b = a; b < triangles.size(); ++b) {
         if (!is_cut[a] && !is_cut[b]) continue;
-        const double distance2 = (triangles[a].middle - triangles[b].middle).squaredNorm();
+        const double distance2 = (middle[a] - middle[b]).squaredNorm();
         if (distance2 < near2) {
           add_near(triangles[a], triangles[b]);
         } else if (distance2 < none_near2) {

@@ -115,9 +115,7 @@ struct Press::Parts {
 
   double friction(std::size_t body) const { return solver.bodies()[body].friction; }
   double deepest_at(std::size_t body, const RigidTransform& pose) const {
-    const GapReach what_is_deepest = solver.surface().flat ? GapReach{0.0, 0.0} : GapReach{};
-    return weighted_gap(solver.surface(), solver.bodies()[body].shape, pose, {}, what_is_deepest, tolerance.outlines)
-        .deepest;
+    return deepest_gap(solver.surface(), solver.bodies()[body].shape, pose, tolerance.outlines);
   }
   std::optional<RigidTransform> straight_above(std::size_t body, RigidTransform pose) const;
   std::optional<RigidTransform> before_touch(std::size_t body, const PressTarget& target, RigidTransform& to,

@@ -170,6 +170,12 @@ void PartSolver::look_up(Iterate& now, const std::vector<PartTarget>& targets, P
   }
 }
 
+/// Does the body that a vertex faces cut its hat?
+bool PartSolver::is_cut(const Iterate& now, int vertex) {
+  const auto& cuts = now.bodies[now.owner[vertex]].gap.cuts;
+  return cuts && place_in(*cuts, vertex) >= 0;
+}
+
 /// Vertices that surely or probably touch, with a ring around them.
 std::vector<int> PartSolver::candidates(const Iterate& now, bool z_forced) const {
   const int n = static_cast<int>(gel_.vertices.size());
@@ -197,12 +203,17 @@ std::vector<int> PartSolver::candidates(const Iterate& now, bool z_forced) const
     const std::size_t place = seen[now.owner[near[k].second]]++;
     if (k < count || place < kFirstCandidates) chosen[near[k].second] = 1;
   }
+  const auto is_beside = [&](int v, const std::vector<char>& marked) {
+    return std::any_of(surface_.around[v].begin(), surface_.around[v].end(), [&](int u) { return marked[u] != 0; });
+  };
+  std::vector<char> taken(chosen);
+  for (int v = 0; v < n; ++v) taken[v] = now.owner[v] >= 0 && (chosen[v] || is_beside(v, chosen));
+  // A sliver of a body overlaps at what is left of a hat: without its own part in the compliance that looks like
+  // penetration at the answer, which would then be sought again with it.
   std::vector<int> result;
   for (int v = 0; v < n; ++v) {
-    if (now.owner[v] < 0) continue;
-    const bool beside = std::any_of(surface_.around[v].begin(), surface_.around[v].end(),
-                                    [&](int neighbour) { return chosen[neighbour] != 0; });
-    if (chosen[v] || beside) result.push_back(v);
+    const bool sliver = !taken[v] && now.owner[v] >= 0 && now.gap(v) < 0.0 && is_cut(now, v) && is_beside(v, taken);
+    if (taken[v] || sliver) result.push_back(v);
   }
   return result;
 }

@@ -111,7 +111,7 @@ FinitePartSolver::FinitePartSolver(const FiniteGel& gel, ContactShape shape, dou
       n_(static_cast<int>(gel.rest.vertices.size())) {}
 
 double FinitePartSolver::overlap(const RigidTransform& pose) const {
-  return -weighted_gap(gel_.rest, shape_, pose).deepest;
+  return -deepest_gap(gel_.rest, shape_, pose);
 }
 
 double FinitePartSolver::tip_overlap(const RigidTransform& pose) const {

@@ -13,7 +13,7 @@ namespace {
 double touching_height(const FiniteGel& gel, const ContactShape& shape) {
   RigidTransform pose;
   for (int k = 0; k < 30; ++k) {
-    const double gap = weighted_gap(gel.rest, shape, pose).deepest;
+    const double gap = deepest_gap(gel.rest, shape, pose);
     if (!std::isfinite(gap)) fail("the body isn't over the gel's middle: no reference press can be made");
     pose.translation.z() -= gap;
     if (std::abs(gap) < 1e-12 * gel.thickness) break;

@@ -140,6 +140,25 @@ TEST(WeightedGap, IsFarWhereTheLinesMiss) {
   for (Eigen::Index i = 0; i < gap.weighted.size(); ++i) EXPECT_TRUE(std::isinf(gap.weighted[i]));
 }
 
+TEST(DeepestGap, IsThatOfTheWholeGapOverAndUnderTheSurface) {
+  const Compliance gel = flat_gel(2.0, 0.25);
+  const ContactSurface surface(gel);
+  const std::vector<ContactShape> shapes{SphereShape{0.9}, RoundedCylinder{0.8, 0.05, 3.0},
+                                         RoundedCylinder{0.1, 0.0, 3.0}, BoxShape{{1.1, 0.7, 0.5}}};
+  for (std::size_t k = 0; k < shapes.size(); ++k) {
+    for (const double z : {0.2, 0.8, 1.7}) {
+      RigidTransform pose = at(0.13, -0.21, z);
+      pose.rotation = rotation_from_xyz({0.07, -0.03, 0.4});
+      for (const bool cut : {false, true}) {
+        const double wanted = weighted_gap(surface, shapes[k], pose, {}, {}, cut).deepest;
+        EXPECT_EQ(deepest_gap(surface, shapes[k], pose, cut), wanted) << k << " at " << z;
+        EXPECT_TRUE(std::isfinite(wanted));
+      }
+    }
+  }
+  EXPECT_TRUE(std::isinf(deepest_gap(surface, shapes.front(), at(50, 0, 0))));
+}
+
 TEST(WeightedGap, LeavesOutOnlyWhatIsAboveItsReach) {
   const Compliance gel = flat_gel(2.0, 0.25);
   const ContactSurface surface(gel);
