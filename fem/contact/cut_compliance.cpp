@@ -41,9 +41,12 @@ Eigen::VectorXd how_cut(const CutHats& cuts, const ContactSurface& surface) {
 /// A triangle's cells where no hat is cut: the same, if they cover it, so that what isn't cut makes no difference.
 std::vector<DensityCell> uncut(const ContactSurface& surface, const CutTriangle& triangle) {
   std::vector<DensityCell> cells = triangle.cells;
+  Matrix3d corners;
+  for (int k = 0; k < 3; ++k) corners.col(k) = surface.vertices[surface.triangles[triangle.triangle][k]];
   double area = 0.0;
   for (DensityCell& cell : cells) {
     cell.density = cell.area * cell.corners;
+    cell.at = corners * cell.corners;
     area += cell.area;
   }
   const double missing = std::abs(surface.triangle_area[triangle.triangle] - area);

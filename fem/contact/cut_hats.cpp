@@ -16,11 +16,12 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr int kAlong = 4;               // cells along an edge
-constexpr double kSingularReach = 0.5;  // of an edge: how far from an edge the pressure rises
-constexpr double kNearEdge = 3.0;       // of a piece's own size: nearer than that its rise is averaged over points
-constexpr double kBentFrom = 0.1;       // bend from which what doesn't overlap begins to be left out
-constexpr double kBentTo = 0.2;         // and is left out
+constexpr int kAlong = 4;                // cells along an edge
+constexpr double kHalfWidth = 0.66;      // of the root of a triangle's area: half of its height
+constexpr double kSingularReach = 0.75;  // of an edge: how far from an edge the pressure rises
+constexpr double kNearEdge = 3.0;        // of a piece's own size: nearer than that its rise is averaged over points
+constexpr double kBentFrom = 0.1;        // bend from which what doesn't overlap begins to be left out
+constexpr double kBentTo = 0.2;          // and is left out
 constexpr double kStraddles = 0.05;  // of a triangle: overlapping share times the rest from which that counts in full
 constexpr double kNarrow = 0.85;     // of a hat: overlaps that fill no hat by more than this are all that bears
 constexpr double kWide = 1.0;        // by so much: narrower than no hat
@@ -100,6 +101,7 @@ Vector3d gradient_of(const Matrix3d& corners, const Vector3d& values) {
 struct Piece {
   Vector3d middle;  ///< barycentric
   Vector3d at;
+  Vector3d raised_at;  ///< the middle of what bears, which the rise draws towards the edge
   double area;
   double value;
   Vector3d off = Vector3d::Zero();  ///< mm: by how much more the gap is where each hat weighs it
@@ -113,7 +115,11 @@ class Builder {
  public:
   Builder(const ContactSurface& surface, const std::vector<CrossedTriangle>& crossed,
           const std::function<double(int, const Vector3d&)>& gap_at)
-      : surface_(surface), gap_at_(gap_at) {
+      : surface_(surface), gap_at_(gap_at), inner_(static_cast<Eigen::Index>(surface.vertices.size())) {
+    for (std::size_t v = 0; v < surface.vertices.size(); ++v) {
+      // Around a vertex within the surface there are as many triangles as neighbours.
+      inner_[static_cast<Eigen::Index>(v)] = surface.around[v].size() == surface.triangles_of[v].size() ? 1.0 : 0.0;
+    }
     for (const CrossedTriangle& t : crossed) {
       crossed_[t.triangle] = &t;
       const Matrix3d corners = corners_of(surface, t.triangle);
@@ -279,9 +285,12 @@ class Builder {
     piece.overlap = covered.overlap;
     piece.within = covered.within;
     piece.area = surface_.triangle_area[triangle] * std::abs(covered.corners.determinant());
-    piece.at = corners * middle;
+    piece.at = piece.raised_at = corners * middle;
     piece.plain = piece.raised = piece.area * middle;
-    const double reach = kSingularReach * std::sqrt(surface_.triangle_area[triangle] * 4.0 / std::sqrt(3.0));
+    // Where the gel ends it gives way sideways, and the pressure rises less.
+    double inner = 0.0;
+    for (int k = 0; k < 3; ++k) inner += middle[k] * inner_[surface_.triangles[triangle][k]];
+    const double reach = inner * kSingularReach * std::sqrt(surface_.triangle_area[triangle] * 4.0 / std::sqrt(3.0));
     const double size = std::sqrt(piece.area);
     if (piece.value > threshold_by(beside.steps, piece.at)) return piece;  // pressure doesn't rise at a step's foot
     std::vector<Stretch> near;
@@ -290,17 +299,28 @@ class Builder {
       if (stretch.squared_distance(piece.at) < farthest * farthest) near.push_back(stretch);
     }
     if (near.empty()) return piece;
-    const auto rise = [&](const Vector3d& point, double least) {
+    const double part = piece.area / static_cast<double>(quarters().size());
+    const double half_width = kHalfWidth * std::sqrt(part);
+    const auto rise = [&](const Vector3d& point) {
       double distance2 = kInfinity;
       for (const Stretch& stretch : near) distance2 = std::min(distance2, stretch.squared_distance(point));
-      return std::max(1.0, std::sqrt(reach / std::max(least, std::sqrt(distance2))));
+      // The mean over the quarter's width.
+      const double distance = std::sqrt(distance2);
+      const double from = std::sqrt(std::max(0.0, distance - half_width));
+      const double to = std::sqrt(distance + half_width);
+      return std::max(1.0, 2.0 * std::sqrt(reach) / (from + to));
     };
-    piece.raised.setZero();
-    const double part = piece.area / static_cast<double>(quarters().size());
+    Vector3d raised = Vector3d::Zero();
+    bool rises = false;
     for (const Matrix3d& quarter : quarters()) {
       const Vector3d at = covered.corners * quarter.rowwise().mean();
-      piece.raised += part * rise(corners * at, 0.25 * std::sqrt(part)) * at;
+      const double here = rise(corners * at);
+      rises = rises || here > 1.0;
+      raised += part * here * at;
     }
+    if (!rises) return piece;
+    piece.raised = raised;
+    piece.raised_at = corners * (piece.raised / piece.raised.sum());
     return piece;
   }
 
@@ -374,7 +394,7 @@ class Builder {
       std::vector<DensityCell>& list = cells[triangle];
       if (list.empty()) {
         for (const Piece& each : pieces(triangle)) {
-          list.push_back({each.middle, gap_at_(triangle, each.middle), each.at, each.area, Vector3d::Zero()});
+          list.push_back({each.middle, gap_at_(triangle, each.middle), each.raised_at, each.area, Vector3d::Zero()});
         }
       }
       list[k].density[corner] = scale * density_of(piece, corner);
@@ -394,6 +414,7 @@ class Builder {
 
   const ContactSurface& surface_;
   const std::function<double(int, const Vector3d&)>& gap_at_;
+  Eigen::VectorXd inner_;  ///< of each vertex: 0 on the surface's border, else 1
   std::map<int, const CrossedTriangle*> crossed_;
   std::map<int, std::vector<Stretch>> stretches_;
   std::map<int, std::vector<Step>> steps_;
