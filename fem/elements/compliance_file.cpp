@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <cstring>
 #include <fstream>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -240,6 +241,12 @@ Compliance read_body(Reader& in, std::optional<std::pair<FarFieldMatrix::Parts, 
       columns.back() != static_cast<std::int32_t>(rows.size()) || !std::is_sorted(columns.begin(), columns.end()) ||
       !within(rows, n) || !within(corners, n)) {
     fail("its matrices don't fit its vertices");
+  }
+  for (std::size_t k = 0; k + 1 < columns.size(); ++k) {  // each row once a column, in order, as Eigen needs them
+    if (std::adjacent_find(rows.begin() + columns[k], rows.begin() + columns[k + 1], std::greater_equal<>()) !=
+        rows.begin() + columns[k + 1]) {
+      fail("its matrices don't fit its vertices");
+    }
   }
   gel.mass = Eigen::Map<const Eigen::SparseMatrix<double>>(n, n, static_cast<Eigen::Index>(rows.size()), columns.data(),
                                                            rows.data(), values.data());

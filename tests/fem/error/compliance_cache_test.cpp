@@ -260,6 +260,24 @@ TEST_F(ComplianceCache, SoundSealOnNumbersThatArentAGelsIsMadeAnew) {
   }
 }
 
+// Eigen takes rows of a sparse matrix in order for granted. libFuzzer found a file without.
+TEST_F(ComplianceCache, SoundSealOnRowsOutOfOrderIsMadeAnew) {
+  const Compliance good = get();
+  const std::string content = read_whole_file(file());
+  const std::size_t vertices_end = kHeaderSize + 4 * 8 + 24 * good.vertices.size();
+  const std::size_t triangles_end = vertices_end + 8 + 12 * good.triangles.size();
+  const std::size_t rows_at = triangles_end + 8 + 4 * (good.vertices.size() + 1) + 8;
+  std::array<std::int32_t, 2> first{};
+  std::memcpy(first.data(), content.data() + rows_at, sizeof(first));
+  ASSERT_EQ(first[0], good.mass.innerIndexPtr()[0]);
+  ASSERT_EQ(first[1], good.mass.innerIndexPtr()[1]);
+  for (const std::array<std::int32_t, 2> wrong : {std::array{first[1], first[0]}, std::array{first[0], first[0]}}) {
+    std::string spoilt = content;
+    std::memcpy(spoilt.data() + rows_at, wrong.data(), sizeof(wrong));
+    expect_rebuilt(sealed(spoilt), "its matrices don't fit its vertices");
+  }
+}
+
 TEST_F(ComplianceCache, MatricesLieInTheMappedFileAndOutliveItsName) {
   const Compliance first = get();
   const Compliance second = get();
