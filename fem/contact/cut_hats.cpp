@@ -298,7 +298,7 @@ class Builder {
     for (const Stretch& stretch : beside.stretches) {
       if (stretch.squared_distance(piece.at) < farthest * farthest) near.push_back(stretch);
     }
-    if (near.empty()) return piece;
+    if (near.empty() || !(piece.area > 0.0)) return piece;
     const double part = piece.area / static_cast<double>(quarters().size());
     const double half_width = kHalfWidth * std::sqrt(part);
     const auto rise = [&](const Vector3d& point) {

@@ -209,10 +209,12 @@ std::vector<int> PartSolver::candidates(const Iterate& now, bool z_forced) const
   std::vector<char> taken(chosen);
   for (int v = 0; v < n; ++v) taken[v] = now.owner[v] >= 0 && (chosen[v] || is_beside(v, chosen));
   // A sliver of a body overlaps at what is left of a hat: without its own part in the compliance that looks like
-  // penetration at the answer, which would then be sought again with it.
+  // penetration at the answer, which would then be sought again with it. On a curved gel more of them can make a system
+  // that isn't positive definite.
   std::vector<int> result;
   for (int v = 0; v < n; ++v) {
-    const bool sliver = !taken[v] && now.owner[v] >= 0 && now.gap(v) < 0.0 && is_cut(now, v) && is_beside(v, taken);
+    const bool sliver =
+        surface_.flat && !taken[v] && now.owner[v] >= 0 && now.gap(v) < 0.0 && is_cut(now, v) && is_beside(v, taken);
     if (taken[v] || sliver) result.push_back(v);
   }
   return result;
