@@ -41,8 +41,7 @@ Eigen::VectorXd how_cut(const CutHats& cuts, const ContactSurface& surface) {
 /// A triangle's cells where no hat is cut: the same, if they cover it, so that what isn't cut makes no difference.
 std::vector<DensityCell> uncut(const ContactSurface& surface, const CutTriangle& triangle) {
   std::vector<DensityCell> cells = triangle.cells;
-  Matrix3d corners;
-  for (int k = 0; k < 3; ++k) corners.col(k) = surface.vertices[surface.triangles[triangle.triangle][k]];
+  const Matrix3d corners = corners_of(surface, triangle.triangle);
   double area = 0.0;
   for (DensityCell& cell : cells) {
     cell.density = cell.area * cell.corners;

@@ -19,7 +19,6 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kAlong = 4;                // cells along an edge
 constexpr double kHalfWidth = 0.66;      // of the root of a triangle's area: half of its height
 constexpr double kSingularReach = 0.75;  // of an edge: how far from an edge the pressure rises
-constexpr double kNearEdge = 3.0;        // of a piece's own size: nearer than that its rise is averaged over points
 constexpr double kBentFrom = 0.1;        // bend from which what doesn't overlap begins to be left out
 constexpr double kBentTo = 0.2;          // and is left out
 constexpr double kStraddles = 0.05;  // of a triangle: overlapping share times the rest from which that counts in full
@@ -48,12 +47,6 @@ std::vector<Matrix3d> split_into(int along) {
 const std::vector<Matrix3d>& quarters() {
   static const std::vector<Matrix3d> made = split_into(kAlong);
   return made;
-}
-
-Matrix3d corners_of(const ContactSurface& surface, int triangle) {
-  Matrix3d m;
-  for (int k = 0; k < 3; ++k) m.col(k) = surface.vertices[surface.triangles[triangle][k]];
-  return m;
 }
 
 /// A stretch of outline in the gel frame.
@@ -115,11 +108,7 @@ class Builder {
  public:
   Builder(const ContactSurface& surface, const std::vector<CrossedTriangle>& crossed,
           const std::function<double(int, const Vector3d&)>& gap_at)
-      : surface_(surface), gap_at_(gap_at), inner_(static_cast<Eigen::Index>(surface.vertices.size())) {
-    for (std::size_t v = 0; v < surface.vertices.size(); ++v) {
-      // Around a vertex within the surface there are as many triangles as neighbours.
-      inner_[static_cast<Eigen::Index>(v)] = surface.around[v].size() == surface.triangles_of[v].size() ? 1.0 : 0.0;
-    }
+      : surface_(surface), gap_at_(gap_at) {
     for (const CrossedTriangle& t : crossed) {
       crossed_[t.triangle] = &t;
       const Matrix3d corners = corners_of(surface, t.triangle);
@@ -186,6 +175,9 @@ class Builder {
   static bool is_raised(const std::vector<Piece>& list) {
     return std::any_of(list.begin(), list.end(), [](const Piece& p) { return p.raised != p.plain; });
   }
+
+  /// Whether a vertex isn't on the surface's border: it then has as many triangles as neighbours.
+  bool is_within(int vertex) const { return surface_.around[vertex].size() == surface_.triangles_of[vertex].size(); }
 
   /// How much the border of the overlap in a triangle leaves out what doesn't overlap: not at all where it only begins
   /// to cross it, so that nothing changes at once.
@@ -289,7 +281,9 @@ class Builder {
     piece.plain = piece.raised = piece.area * middle;
     // Where the gel ends it gives way sideways, and the pressure rises less.
     double inner = 0.0;
-    for (int k = 0; k < 3; ++k) inner += middle[k] * inner_[surface_.triangles[triangle][k]];
+    for (int k = 0; k < 3; ++k) {
+      if (is_within(surface_.triangles[triangle][k])) inner += middle[k];
+    }
     const double reach = inner * kSingularReach * std::sqrt(surface_.triangle_area[triangle] * 4.0 / std::sqrt(3.0));
     const double size = std::sqrt(piece.area);
     if (piece.value > threshold_by(beside.steps, piece.at)) return piece;  // pressure doesn't rise at a step's foot
@@ -320,7 +314,7 @@ class Builder {
     }
     if (!rises) return piece;
     piece.raised = raised;
-    piece.raised_at = corners * (piece.raised / piece.raised.sum());
+    piece.raised_at = corners * (raised / raised.sum());
     return piece;
   }
 
@@ -414,7 +408,6 @@ class Builder {
 
   const ContactSurface& surface_;
   const std::function<double(int, const Vector3d&)>& gap_at_;
-  Eigen::VectorXd inner_;  ///< of each vertex: 0 on the surface's border, else 1
   std::map<int, const CrossedTriangle*> crossed_;
   std::map<int, std::vector<Stretch>> stretches_;
   std::map<int, std::vector<Step>> steps_;
@@ -424,6 +417,12 @@ class Builder {
 };
 
 }  // namespace
+
+Matrix3d corners_of(const ContactSurface& surface, int triangle) {
+  Matrix3d m;
+  for (int k = 0; k < 3; ++k) m.col(k) = surface.vertices[surface.triangles[triangle][k]];
+  return m;
+}
 
 std::vector<DensityCell> whole_cells(const ContactSurface& surface, int triangle) {
   const Matrix3d corners = corners_of(surface, triangle);
@@ -453,104 +452,6 @@ void set_overlap(CoveredPiece& piece) {
 CutHats cut_hats(const ContactSurface& surface, const std::vector<CrossedTriangle>& crossed,
                  const std::function<double(int, const Vector3d&)>& gap_at) {
   return Builder(surface, crossed, gap_at).build();
-}
-
-Eigen::Index place_in(const CutHats& cuts, int vertex) {
-  const auto found = std::lower_bound(cuts.vertices.begin(), cuts.vertices.end(), vertex);
-  return found != cuts.vertices.end() && *found == vertex ? found - cuts.vertices.begin() : -1;
-}
-
-Eigen::VectorXd moved_gaps(const ContactSurface& surface, const CutHats& cuts,
-                           const std::function<double(int, const Vector3d&)>& gap_at) {
-  // What each cell's gap changed by, for each vertex with the density that it has there.
-  std::map<int, std::vector<std::pair<double, double>>> changes;
-  for (const int v : cuts.vertices) changes[v];
-  for (const CutTriangle& triangle : cuts.triangles) {
-    const auto& index = surface.triangles[triangle.triangle];
-    for (const DensityCell& cell : triangle.cells) {
-      const double change = gap_at(triangle.triangle, cell.corners) - cell.gap;
-      if (!std::isfinite(change)) continue;
-      for (int a = 0; a < 3; ++a) {
-        if (!(cell.density[a] > 0.0)) continue;
-        const auto found = changes.find(index[a]);
-        if (found != changes.end()) found->second.emplace_back(change, cell.density[a]);
-      }
-    }
-  }
-  Eigen::VectorXd result = cuts.gap;
-  for (Eigen::Index k = 0; k < result.size(); ++k) {
-    std::vector<std::pair<double, double>>& own = changes[cuts.vertices[static_cast<std::size_t>(k)]];
-    if (own.empty()) continue;  // the body has left it
-    std::sort(own.begin(), own.end());
-    double half = 0.0;
-    for (const auto& [change, density] : own) half += 0.5 * density;
-    double sum = 0.0;
-    for (const auto& [change, density] : own) {
-      sum += density;
-      if (sum < half) continue;
-      result[k] += change;
-      break;
-    }
-  }
-  return result;
-}
-
-std::shared_ptr<const CutHats> joint_cuts(const ContactSurface& surface,
-                                          const std::vector<std::shared_ptr<const CutHats>>& of_bodies,
-                                          const std::vector<int>& owner) {
-  std::vector<std::shared_ptr<const CutHats>> cutting;
-  for (const auto& cuts : of_bodies) {
-    if (cuts) cutting.push_back(cuts);
-  }
-  if (cutting.empty()) return nullptr;
-  if (of_bodies.size() == 1) return cutting.front();
-  auto joint = std::make_shared<CutHats>();
-  std::map<int, int> body_of;  // the body that cuts a vertex's hat
-  std::map<int, double> share_of;
-  for (std::size_t b = 0; b < of_bodies.size(); ++b) {
-    if (!of_bodies[b]) continue;
-    for (std::size_t k = 0; k < of_bodies[b]->vertices.size(); ++k) {
-      const int v = of_bodies[b]->vertices[k];
-      if (owner[v] != static_cast<int>(b)) continue;
-      body_of[v] = static_cast<int>(b);
-      share_of[v] = of_bodies[b]->share[static_cast<Eigen::Index>(k)];
-    }
-  }
-  joint->share.resize(static_cast<Eigen::Index>(body_of.size()));
-  std::vector<int> triangles;
-  for (const auto& [v, unused] : body_of) {
-    joint->share[static_cast<Eigen::Index>(joint->vertices.size())] = share_of[v];
-    joint->vertices.push_back(v);
-    triangles.insert(triangles.end(), surface.triangles_of[v].begin(), surface.triangles_of[v].end());
-  }
-  std::sort(triangles.begin(), triangles.end());
-  triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
-  for (const int t : triangles) {
-    CutTriangle triangle{t, {}};
-    // Cells of one body, or whole ones, of which the corners' densities are taken that are its own.
-    const auto take = [&](const std::vector<DensityCell>& cells, int body) {
-      std::array<bool, 3> own{};
-      for (int a = 0; a < 3; ++a) {
-        const auto found = body_of.find(surface.triangles[t][a]);
-        own[a] = (found == body_of.end() ? -1 : found->second) == body;
-      }
-      if (std::none_of(own.begin(), own.end(), [](bool x) { return x; })) return;
-      for (DensityCell cell : cells) {
-        for (int a = 0; a < 3; ++a) cell.density[a] = own[a] ? cell.density[a] : 0.0;
-        triangle.cells.push_back(cell);
-      }
-    };
-    for (std::size_t b = 0; b < of_bodies.size(); ++b) {
-      if (!of_bodies[b]) continue;
-      const auto& list = of_bodies[b]->triangles;
-      const auto found = std::lower_bound(list.begin(), list.end(), t,
-                                          [](const CutTriangle& one, int index) { return one.triangle < index; });
-      if (found != list.end() && found->triangle == t) take(found->cells, static_cast<int>(b));
-    }
-    take(whole_cells(surface, t), -1);
-    joint->triangles.push_back(std::move(triangle));
-  }
-  return joint;
 }
 
 }  // namespace touchstone::fem

@@ -77,6 +77,9 @@ double threshold_at(const CrossedTriangle& crossed, const Eigen::Vector3d& point
 /// Sets what overlaps of a piece, as if its gap were linear.
 void set_overlap(CoveredPiece& piece);
 
+/// A triangle's corners as columns, mm: times a barycentric point they are its place.
+Eigen::Matrix3d corners_of(const ContactSurface& surface, int triangle);
+
 /// A triangle's cells where no hat is cut: its split into 16.
 std::vector<DensityCell> whole_cells(const ContactSurface& surface, int triangle);
 

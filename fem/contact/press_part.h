@@ -120,7 +120,6 @@ class PartSolver {
   bool cuts_hold(const CachedGap& cached, const Body& body, double part) const;
   WeightedGap gap_of(std::size_t body, const Iterate& now, PartEffort& effort);
   void look_up(Iterate& now, const std::vector<PartTarget>& targets, PartEffort& effort);
-  static bool is_cut(const Iterate& now, int vertex);
   std::vector<int> candidates(const Iterate& now, bool z_forced) const;
   ContactProblem problem(const PressSnapshot& from, const std::vector<PartTarget>& targets, const Iterate& now);
   Eigen::VectorXd drag(const PressSnapshot& from, const Iterate& now) const;

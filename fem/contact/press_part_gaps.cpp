@@ -170,12 +170,6 @@ void PartSolver::look_up(Iterate& now, const std::vector<PartTarget>& targets, P
   }
 }
 
-/// Does the body that a vertex faces cut its hat?
-bool PartSolver::is_cut(const Iterate& now, int vertex) {
-  const auto& cuts = now.bodies[now.owner[vertex]].gap.cuts;
-  return cuts && place_in(*cuts, vertex) >= 0;
-}
-
 /// Vertices that surely or probably touch, with a ring around them.
 std::vector<int> PartSolver::candidates(const Iterate& now, bool z_forced) const {
   const int n = static_cast<int>(gel_.vertices.size());
@@ -206,7 +200,11 @@ std::vector<int> PartSolver::candidates(const Iterate& now, bool z_forced) const
   const auto is_beside = [&](int v, const std::vector<char>& marked) {
     return std::any_of(surface_.around[v].begin(), surface_.around[v].end(), [&](int u) { return marked[u] != 0; });
   };
-  std::vector<char> taken(chosen);
+  const auto is_cut = [&](int v) {
+    const auto& cuts = now.bodies[now.owner[v]].gap.cuts;
+    return cuts && place_in(*cuts, v) >= 0;
+  };
+  std::vector<char> taken(chosen.size());
   for (int v = 0; v < n; ++v) taken[v] = now.owner[v] >= 0 && (chosen[v] || is_beside(v, chosen));
   // A sliver of a body overlaps at what is left of a hat: without its own part in the compliance that looks like
   // penetration at the answer, which would then be sought again with it. On a curved gel more of them can make a system
@@ -214,7 +212,7 @@ std::vector<int> PartSolver::candidates(const Iterate& now, bool z_forced) const
   std::vector<int> result;
   for (int v = 0; v < n; ++v) {
     const bool sliver =
-        surface_.flat && !taken[v] && now.owner[v] >= 0 && now.gap(v) < 0.0 && is_cut(now, v) && is_beside(v, taken);
+        surface_.flat && !taken[v] && now.owner[v] >= 0 && now.gap(v) < 0.0 && is_cut(v) && is_beside(v, taken);
     if (taken[v] || sliver) result.push_back(v);
   }
   return result;
