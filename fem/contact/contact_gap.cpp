@@ -113,7 +113,7 @@ WeightedGap gap_of(const ContactSurface& surface, const ContactShape& shape, con
       const double middle = silhouette_distance(body, ball.centre, along).value_or(ball.radius);
       if (middle > 0.0) narrowest = std::min(narrowest, middle);
     }
-    TriangleGap triangle(body, gel_from_object.inverse(), ball.radius, narrowest, surface.farthest_behind);
+    TriangleGap triangle(body, gel_from_object.inverse(), ball.radius, narrowest, surface.farthest_behind, cut);
     Eigen::VectorXd corner_gap(n);
     for (std::size_t v = 0; v < moved.size(); ++v) {
       corner_gap[static_cast<Eigen::Index>(v)] = triangle.corner_gap(moved[v], surface.normals[v]);

@@ -87,7 +87,8 @@ struct GapReach {
 /// Integrates by the 7-point rule of degree 5; triangles that the silhouette crosses, or that are large beside the
 /// body, are split, and the cells on the silhouette clipped at it. The gel is looked up where `lookup` has moved it
 /// along itself. With `cut`, hats are cut by the body's outline (see cut_hats.h), or are taken as `kept` has them if
-/// that is given: the body has moved but a little since.
+/// that is given: the body has moved but a little since. And triangles of a curved gel bulge as their normals say;
+/// without it they are flat, as at finite strain.
 WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shape,
                          const RigidTransform& gel_from_object, const PatchMotion& lookup = {}, GapReach reach = {},
                          bool cut = false, std::shared_ptr<const CutHats> kept = nullptr);

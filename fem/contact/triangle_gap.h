@@ -22,14 +22,16 @@ namespace touchstone::fem {
 template <typename Shape>
 class TriangleGap {
  public:
-  /// `narrowest`: how wide the body is seen along the normals of a flat gel, from its middle to its outline.
+  /// `narrowest`: how wide the body is seen along the normals of a flat gel, from its middle to its outline. `curved`:
+  /// triangles of a curved gel bulge to where their normals say that the gel is.
   TriangleGap(const Shape& shape, const RigidTransform& object_from_gel, double body_radius, double narrowest,
-              double farthest_behind)
+              double farthest_behind, bool curved)
       : shape_(shape),
         object_from_gel_(object_from_gel),
         body_radius_(body_radius),
         narrowest_(narrowest),
-        farthest_behind_(farthest_behind) {}
+        farthest_behind_(farthest_behind),
+        curved_(curved) {}
 
   /// int phi_k gap dA, int phi_k dA over the part that hits, and the least gap.
   Eigen::Vector3d gap;
@@ -63,11 +65,7 @@ class TriangleGap {
     gap.setZero();
     covered.setZero();
     lowest = kInfinity;
-    for (int k = 0; k < 3; ++k) {
-      points_.col(k) = object_from_gel_ * corners[k];
-      normals_.col(k) = object_from_gel_.turn(normals[k]);
-    }
-    one_normal_ = one_normal;
+    place(corners, normals, one_normal);
     area_ = area;
     has_silhouette_ = one_normal_ && silhouette_distance(shape_, points_.col(0), normals_.col(0)).has_value();
     // Bodies smaller than the triangle must not fall between its points.
@@ -84,11 +82,7 @@ class TriangleGap {
   /// The gap at a point of the triangle last set up.
   void set_up(const std::array<Eigen::Vector3d, 3>& corners, const std::array<Eigen::Vector3d, 3>& normals,
               bool one_normal) {
-    for (int k = 0; k < 3; ++k) {
-      points_.col(k) = object_from_gel_ * corners[k];
-      normals_.col(k) = object_from_gel_.turn(normals[k]);
-    }
-    one_normal_ = one_normal;
+    place(corners, normals, one_normal);
     collect_ = false;
   }
   double gap_at(const Eigen::Vector3d& b) const { return at(b).value_or(kInfinity); }
@@ -108,14 +102,41 @@ class TriangleGap {
   static constexpr double kWallSlope = 4.0;  // of a gap along the surface, from which the body's side is seen
   static constexpr double kWallRise =
       0.15;  // of a triangle's size: lower than this above the body nobody asks for the slope
-  static constexpr double kWallStep = 1e-4;  // of a triangle
+  static constexpr double kWallStep = 1e-4;   // of a triangle
+  static constexpr double kSharpEdge = 0.94;  // cosine between a triangle and its normals: where they differ by more,
+                                              // by 20 degrees, the gel has an edge
   static constexpr int kStepBisections = 8;
   static constexpr double kStepLeft = 0.6;  // of a difference, left where the interval is so much smaller: a step
+
+  void place(const std::array<Eigen::Vector3d, 3>& corners, const std::array<Eigen::Vector3d, 3>& normals,
+             bool one_normal) {
+    for (int k = 0; k < 3; ++k) {
+      points_.col(k) = object_from_gel_ * corners[k];
+      normals_.col(k) = object_from_gel_.turn(normals[k]);
+    }
+    one_normal_ = one_normal;
+    bulge_.setZero();
+    if (!curved_ || one_normal) return;
+    const Eigen::Vector3d flat = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalized();
+    for (const Eigen::Vector3d& normal : normals) {
+      if (normal.dot(flat) < kSharpEdge) return;
+    }
+    for (int k = 0; k < 3; ++k) {
+      const int next = (k + 1) % 3;
+      bulge_[k] = 0.5 * (normals[next] - normals[k]).dot(corners[next] - corners[k]);
+    }
+  }
+
+  /// How far the gel stands out beyond the flat triangle: as far as a parabola along each edge whose slope changes by
+  /// its normals' difference.
+  double bulge(const Eigen::Vector3d& b) const {
+    return bulge_[0] * b[0] * b[1] + bulge_[1] * b[1] * b[2] + bulge_[2] * b[2] * b[0];
+  }
 
   /// Nothing, too, on the body's side where hats are cut: on a curved gel a wall is seen as a steep rise. On a flat
   /// one, where the silhouette is known, lines miss a wall, and what is steep is the flank of a needle.
   std::optional<double> at(const Eigen::Vector3d& b) const {
-    const auto found = entry(points_ * b, direction(b));
+    const auto found = gap_along(b);
     const bool may_be_wall = collect_ && !has_silhouette_ && found && *found > lowest_wall_;
     return may_be_wall && is_wall(b, *found) ? std::nullopt : found;
   }
@@ -126,7 +147,7 @@ class TriangleGap {
     for (int k = 0; k < 2; ++k) {
       edges.col(k) = points_ * along[k];
       const Eigen::Vector3d beside = b + kWallStep * along[k];
-      const auto there = entry(points_ * beside, direction(beside));
+      const auto there = gap_along(beside);
       if (!there) return true;
       rise[k] = (*there - value) / kWallStep;
     }
@@ -140,6 +161,11 @@ class TriangleGap {
     if (!found || *found >= -farthest_behind_) return found;
     const auto back = first_entry(shape_, point, -normal);  // where the line leaves the body, seen from outside
     return back && -*back < -farthest_behind_ ? std::nullopt : found;
+  }
+  std::optional<double> gap_along(const Eigen::Vector3d& b) const {
+    auto found = entry(points_ * b, direction(b));
+    if (found) *found -= bulge(b);
+    return found;
   }
   /// Whether there is an entry.
   bool hits(const Eigen::Vector3d& b) const {
@@ -464,8 +490,10 @@ class TriangleGap {
   const double body_radius_;
   const double narrowest_;
   const double farthest_behind_;
+  const bool curved_;
   Eigen::Matrix3d points_;
   Eigen::Matrix3d normals_;
+  Eigen::Vector3d bulge_ = Eigen::Vector3d::Zero();  ///< mm, of each edge: four times what it is in its middle
   bool one_normal_ = true;
   bool has_silhouette_ = false;
   double area_ = 0.0;

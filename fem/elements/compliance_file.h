@@ -21,7 +21,7 @@
 namespace touchstone::fem {
 
 /// Raised with each change of the file's layout, or of how a compliance is computed.
-inline constexpr int kComplianceFormat = 5;
+inline constexpr int kComplianceFormat = 6;
 
 /// Writes the file whole or not at all (see write_whole_file). `key` has 64 characters. @throws Error if it can't
 void write_compliance(const std::filesystem::path& path, const std::string& key, const Compliance& gel);

@@ -140,6 +140,53 @@ TEST(WeightedGap, IsFarWhereTheLinesMiss) {
   for (Eigen::Index i = 0; i < gap.weighted.size(); ++i) EXPECT_TRUE(std::isinf(gap.weighted[i]));
 }
 
+TEST(WeightedGap, OfACurvedGelIsThatOfItsSphereNotOfItsTriangles) {
+  // Triangles of 1 mm on a sphere of 10 mm lie up to 25 um below it, 10 to 15 on the mean over a hat.
+  constexpr double kRadius = 10.0;
+  constexpr double kHigh = 0.1;  // of a flat face above the sphere
+  std::vector<Eigen::Vector3d> places;
+  std::vector<std::array<int, 3>> faces;
+  constexpr int kSide = 5;
+  for (int i = 0; i < kSide; ++i) {
+    for (int j = 0; j < kSide; ++j) {
+      places.push_back(kRadius * Eigen::Vector3d(i - 2.0, j - 2.0, kRadius).normalized());
+      if (i + 1 == kSide || j + 1 == kSide) continue;
+      const int v = i * kSide + j;
+      faces.push_back({v, v + kSide, v + kSide + 1});
+      faces.push_back({v, v + kSide + 1, v + 1});
+    }
+  }
+  const ContactSurface surface(places, faces, test::surface_mass(places, faces), kRadius);
+  const BoxShape face{{40, 40, 1}};
+  const RigidTransform pose = at(0, 0, kRadius + kHigh + 0.5);
+  const WeightedGap curved = weighted_gap(surface, face, pose, {}, {}, true);
+  const WeightedGap flat = weighted_gap(surface, face, pose, {}, {}, false);
+  const int middle = kSide * kSide / 2;
+  double wanted = 0.0;
+  constexpr int kCells = 60;
+  for (const int t : surface.triangles_of[middle]) {
+    const auto& corners = surface.triangles[t];
+    for (int i = 0; i < kCells; ++i) {
+      for (int j = 0; i + j < kCells; ++j) {
+        const Eigen::Vector3d b(i + 1.0 / 3.0, j + 1.0 / 3.0, kCells - i - j - 2.0 / 3.0);
+        Eigen::Vector3d point = Eigen::Vector3d::Zero();
+        double hat = 0.0;
+        for (int k = 0; k < 3; ++k) {
+          point += b[k] / kCells * surface.vertices[corners[k]];
+          if (corners[k] == middle) hat = b[k] / kCells;
+        }
+        const double gap = (kRadius + kHigh) * point.norm() / point.z() - kRadius;
+        const double twice = i + j + 1 < kCells ? 2.0 : 1.0;  // for the cell that stands on its head
+        wanted += twice * hat * gap * surface.triangle_area[t] / (kCells * kCells);
+      }
+    }
+  }
+  wanted /= surface.weight[middle];
+  EXPECT_NEAR(curved.plain[middle] / surface.weight[middle], wanted, 5e-4);
+  EXPECT_GT(flat.plain[middle] / surface.weight[middle], wanted + 0.01);
+  EXPECT_NEAR(curved.deepest, kHigh, 5e-4);
+}
+
 TEST(DeepestGap, IsThatOfTheWholeGapOverAndUnderTheSurface) {
   const Compliance gel = flat_gel(2.0, 0.25);
   const ContactSurface surface(gel);

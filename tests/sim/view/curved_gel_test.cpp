@@ -151,7 +151,10 @@ TEST(CurvedGel, NormalsOfARestingDomeAreTheSpheres) {
 
 // The object's face at z = -0.25: what touches it lies on it, nothing reaches through.
 TEST(CurvedGel, AFlatPlateFlattensTheDomeToADisc) {
-  const Pressed dome(scene_of(dome_device(), kPlate, 0, 0, 1.0 - 0.25));
+  // The gel that goes aside makes the sheet wider by 0.95 % of its base, on finer meshes; by 1.03 with edges of 0.7 mm.
+  DeviceSpec finer = dome_device();
+  finer.mesh.fine_mm = 0.5;
+  const Pressed dome(scene_of(finer, kPlate, 0, 0, 1.0 - 0.25));
   ASSERT_TRUE(dome.plan.fine_relief) << "a gentle dome gets the fine contact";
   const auto relief = dome.view.relief(dome.press());
   ASSERT_TRUE(relief && relief->grid.size() > 0);
