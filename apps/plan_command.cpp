@@ -4,10 +4,12 @@
 #include <memory>
 
 #include "apps/command.h"
+#include "apps/plan_check.h"
 #include "apps/progress_bar.h"
 #include "core/error.h"
 #include "core/yaml_reader.h"
 #include "datasets/jobs/prepared_job.h"
+#include "datasets/jobs/scene_plan.h"
 #include "datasets/sets/planned_draw.h"
 #include "lab/studies/study_plan.h"
 #include "sim/press/gel_plan.h"
@@ -66,15 +68,25 @@ void print_gel(const std::string& title, const sim::DeviceSpec& device, const Gl
   fmt::print("\n{}{}", title, describe(sim::plan_gel(device, global.cache)));
 }
 
-void plan_scene(const std::filesystem::path& file, bool linear_range, const GlobalOptions& global) {
+void plan_scene(const std::filesystem::path& file, bool linear_range, bool check, const GlobalOptions& global) {
   const sim::SceneSpec scene = sim::read_scene(file);
-  print_plan(sim::make_plan(scene));
+  sim::Plan planned;
+  {
+    ProgressBar bar(global.quiet);
+    planned = datasets::plan_scene(scene, global.cache, bar.listener());
+  }
+  print_plan(planned);
   print_gel("", scene.device, global);
+  if (check) print_plan_check(scene, planned, global);
   if (linear_range) print_linear_range(scene, global);
 }
 
 void plan_job(const std::filesystem::path& file, bool linear_range, const GlobalOptions& global) {
-  const datasets::PreparedJob job = datasets::prepare_job(file);
+  datasets::PreparedJob job = datasets::prepare_job(file);
+  {
+    ProgressBar bar(global.quiet);
+    datasets::plan_by_need(job, global.cache, bar.listener());
+  }
   fmt::print("job {}: {} scenes, {} samples\n", job.job.name, job.scenes.size(), job.samples);
   const sim::Plan* before = nullptr;
   for (const datasets::PreparedScene& scene : job.scenes) {
@@ -149,8 +161,11 @@ constexpr UnplannedFile kUnplanned[] = {
     {"lump", "it is a palpation's file; `touchstone validate vhs.palpation` presses its lumps by a law of their own"},
 };
 
-void plan(const std::filesystem::path& file, bool linear_range, const GlobalOptions& global) {
+void plan(const std::filesystem::path& file, bool linear_range, bool check, const GlobalOptions& global) {
   const YamlReader in = YamlReader::open(file);
+  if (check && (in.has("draw") || in.has("scenes") || in.has("kind") || in.has("vary"))) {
+    fail("{}: --check takes a scene's file", file.string());
+  }
   if (in.has("draw")) return plan_draw(file, linear_range, global);
   if (in.has("scenes")) return plan_job(file, linear_range, global);
   if (in.has("kind") || in.has("vary")) return plan_study(file, linear_range, global);
@@ -159,7 +174,7 @@ void plan(const std::filesystem::path& file, bool linear_range, const GlobalOpti
     fail("{}: {}; `touchstone plan` takes scenes, jobs of scenes, jobs that draw, and studies", file.string(),
          kind.words);
   }
-  plan_scene(file, linear_range, global);
+  plan_scene(file, linear_range, check, global);
 }
 
 }  // namespace
@@ -173,8 +188,12 @@ void add_plan_command(CLI::App& app, const GlobalOptions& global, Action& action
   command->add_flag("--linear-range", *linear_range,
                     "Also press the (first) scene's object by finite strain, and tell how far the forces of linear "
                     "elasticity are off and what each costs (half a minute and more)");
-  command->callback([&action, &global, file, linear_range] {
-    action = [&global, file, linear_range] { plan(*file, *linear_range, global); };
+  auto check = std::make_shared<bool>(false);
+  command->add_flag("--check", *check,
+                    "Also simulate the scene's hardest states closely, with each effect the other way, and print what "
+                    "that changes beside what the plan goes by (a scene's file; a minute and more)");
+  command->callback([&action, &global, file, linear_range, check] {
+    action = [&global, file, linear_range, check] { plan(*file, *linear_range, *check, global); };
   });
 }
 

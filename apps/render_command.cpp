@@ -7,6 +7,7 @@
 #include "apps/progress_bar.h"
 #include "core/error.h"
 #include "core/whole_file.h"
+#include "datasets/jobs/scene_plan.h"
 #include "datasets/sets/run_identity.h"
 #include "datasets/sets/sample_source.h"
 #include "sensors/events/event_file.h"
@@ -114,7 +115,11 @@ void render(const RenderOptions& options, const GlobalOptions& global) {
   if (frame >= frames) {
     fail("--frame {}: the scene {} has frames 0 to {}", frame, options.scene.string(), frames - 1);
   }
-  const sim::Plan plan = sim::make_plan(scene);
+  sim::Plan plan;
+  {
+    ProgressBar bar(global.quiet);
+    plan = datasets::plan_scene(scene, global.cache, bar.listener());
+  }
   for (const std::string& doubt : plan.warnings) spdlog::warn("{}", doubt);
   sim::Capture capture;
   std::string warning;

@@ -35,6 +35,7 @@ void fields(YamlReader& in, Job& job) {
   in.optional("licence", job.licence);
   in.required("scenes", job.scenes);
   in.optional("outputs", job.outputs);
+  in.optional("accuracy", job.accuracy);
   if (job.scenes.empty()) fail_at(in.where("scenes"), "scenes: has no scene; at least one is needed");
   std::set<std::string> names;
   for (const JobScene& scene : job.scenes) {

@@ -29,7 +29,8 @@ struct Job {
   std::string licence;  ///< of the data set: an SPDX name or any text; empty: none stated
   std::uint64_t seed = 0;
   std::vector<JobScene> scenes;
-  std::optional<sim::OutputSpec> outputs;  ///< instead of every scene's own outputs, as a whole
+  std::optional<sim::OutputSpec> outputs;     ///< instead of every scene's own outputs, as a whole
+  std::optional<sim::AccuracySpec> accuracy;  ///< counts more than the scenes' own
   SourceLocation where;
 };
 

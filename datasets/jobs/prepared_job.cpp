@@ -16,6 +16,7 @@ PreparedJob prepare_job(const std::filesystem::path& file) {
     scene.spec.seed = prepared.job.seed;
     if (entry.start_mm) scene.spec.motion.start_mm = *entry.start_mm;
     if (prepared.job.outputs) scene.spec.outputs = *prepared.job.outputs;
+    scene.spec.accuracy = sim::merged(prepared.job.accuracy, scene.spec.accuracy);
     scene.plan = sim::make_plan(scene.spec);
     // Reads and checks a mesh or relief file now, before anything is written.
     for (const sim::MovedObject& moved : sim::moved_objects(scene.spec)) sim::contact_shape(moved.object);

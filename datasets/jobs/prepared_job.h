@@ -31,8 +31,9 @@ struct PreparedJob {
   std::int64_t samples = 0;
 };
 
-/// Reads a job and all that it names. All scenes get the job's seed: they show one unit of the device, and samples
-/// differ by their index. A data set holds one device, so that its arrays have one shape.
+/// Reads a job and all that it names. Plans go by fixed shares until plan_by_need() (scene_plan.h). All scenes get the
+/// job's seed: they show one unit of the device, and samples differ by their index. A data set holds one device, so
+/// that its arrays have one shape.
 /// @throws Error with file and line
 PreparedJob prepare_job(const std::filesystem::path& file);
 

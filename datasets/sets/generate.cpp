@@ -41,6 +41,7 @@ GenerateOptions simulated(const std::filesystem::path& cache_folder) {
   GenerateOptions options;
   options.scenes = simulator(cache_folder);
   options.sensors = virtual_sensors(cache_folder);
+  options.cache = cache_folder;
   return options;
 }
 

@@ -32,10 +32,11 @@ Shard shard_of(const std::string& text);
 
 /// How a job is run.
 struct GenerateOptions {
-  SampleSource scenes;   ///< of a job with `scenes`
-  SensorSource sensors;  ///< of a job with `draw`
-  int threads = 0;       ///< at most so many; 0: as many as the machine has
-  Shard shard;           ///< of a job with `draw`; 1 of 1: everything, and then what merge does
+  SampleSource scenes;          ///< of a job with `scenes`
+  SensorSource sensors;         ///< of a job with `draw`
+  std::filesystem::path cache;  ///< where what effects change is kept; empty: nowhere
+  int threads = 0;              ///< at most so many; 0: as many as the machine has
+  Shard shard;                  ///< of a job with `draw`; 1 of 1: everything, and then what merge does
   bool timings =
       true;  ///< put wall times in a set of scenes' manifest; without them the folder is the same in every run
 };

@@ -12,6 +12,7 @@
 #include "core/random_pairs.h"
 #include "core/sha256.h"
 #include "core/whole_file.h"
+#include "datasets/jobs/scene_plan.h"
 #include "datasets/sets/manifest.h"
 #include "datasets/sets/run_folder.h"
 #include "datasets/sets/scene_manifest.h"
@@ -347,7 +348,9 @@ GenerateReport generate_scenes(const PreparedJob& job, const fs::path& out, cons
     folder.finish();
     return finished;
   }
-  Run run(job, out, options.scenes, progress);
+  PreparedJob planned = job;
+  plan_by_need(planned, options.cache, progress);
+  Run run(planned, out, options.scenes, progress);
   run.mechanics();
   run.pictures(folder, folder.whole_records());
   run.truth();

@@ -13,6 +13,7 @@
 #include "core/seconds_since.h"
 #include "core/units.h"
 #include "render/imager/imager.h"
+#include "render/imager/mean_electrons.h"
 #include "sim/press/play_motion.h"
 #include "sim/scene/device_imager.h"
 #include "sim/view/visible_scene.h"
@@ -24,36 +25,6 @@ constexpr double kDepthSpread = 0.2;
 constexpr double kDrag = 1.0 / 3.0;  // of the depth
 
 using Clock = std::chrono::steady_clock;
-
-/// The channels that a picture's pixels are compared by.
-int channels_of(const render::Imager& imager) {
-  return static_cast<int>(imager.quantum_efficiency.rows());
-}
-
-std::vector<render::ImagerResponse> responses_of(const render::Imager& imager) {
-  std::vector<render::ImagerResponse> responses;
-  for (int c = 0; c < channels_of(imager); ++c) {
-    responses.push_back(render::response_of(render::channel_imager(imager, c)));
-  }
-  return responses;
-}
-
-/// Mean electrons of each channel at each pixel, as if each pixel had all of them.
-cv::Mat electrons_of(const cv::Mat& irradiance, const render::Imager& imager) {
-  std::vector<cv::Mat> bands;
-  cv::split(irradiance, bands);
-  std::vector<cv::Mat> channels;
-  for (const render::ImagerResponse& response : responses_of(imager)) {
-    cv::Mat sum = cv::Mat::zeros(irradiance.size(), CV_32F);
-    for (std::size_t b = 0; b < bands.size(); ++b) {
-      sum += bands[b] * response.electrons_per_irradiance(0, static_cast<Eigen::Index>(b));
-    }
-    channels.push_back(sum);
-  }
-  cv::Mat all;
-  cv::merge(channels, all);
-  return all;
-}
 
 constexpr int kBlur = 7;  // pixels
 
@@ -205,7 +176,8 @@ SceneRun run_scene(const sim::SceneSpec& scene, const fem::Compliance& gel, bool
   begun = Clock::now();
   const sim::VirtualCamera camera(scene, plan, gel, whole ? std::span<const sim::Truth>() : truths);
   run.camera_seconds = seconds_since(begun);
-  const render::Imager imager = sim::imager(scene.device, plan.bands, false);
+  const std::vector<render::ImagerResponse> responses =
+      render::channel_responses(sim::imager(scene.device, plan.bands, false));
   double seconds = 0.0;
   run.direct = true;
   for (std::size_t k = 1; k < truths.size(); ++k) {
@@ -214,7 +186,7 @@ SceneRun run_scene(const sim::SceneSpec& scene, const fem::Compliance& gel, bool
     seconds += seconds_since(begun);
     run.paths += capture.paths_traced;
     run.direct = run.direct && capture.direct;
-    run.electrons.push_back(electrons_of(capture.radiance, imager));
+    run.electrons.push_back(render::mean_electrons(capture.radiance, responses));
     run.numbers.push_back(capture.frame);
     run.light = capture.direct ? "direct light" : capture.light.empty() ? "paths" : capture.light;
   }
@@ -231,7 +203,7 @@ TwoRuns run_twice(sim::SceneSpec scene, const fem::Compliance& gel, bool whole) 
 }
 
 double part_below_full_well(const TwoRuns& runs, const render::Imager& imager) {
-  const std::vector<render::ImagerResponse> responses = responses_of(imager);
+  const std::vector<render::ImagerResponse> responses = render::channel_responses(imager);
   std::size_t below = 0, all = 0;
   for (std::size_t k = 0; k < runs[0].electrons.size(); ++k) {
     const cv::Mat& one = runs[0].electrons[k];
@@ -245,7 +217,7 @@ double pixel_error(const std::vector<cv::Mat>& one, const std::vector<cv::Mat>& 
                    const std::vector<cv::Mat>& true_one, const std::vector<cv::Mat>& true_other,
                    const render::Imager& imager) {
   TS_ASSERT(one.size() == true_one.size() && other.size() == true_other.size() && one.size() == other.size());
-  const std::vector<render::ImagerResponse> responses = responses_of(imager);
+  const std::vector<render::ImagerResponse> responses = render::channel_responses(imager);
   double sum = 0.0;
   std::size_t count = 0;
   for (std::size_t k = 0; k < one.size(); ++k) {
@@ -270,7 +242,7 @@ double pixel_error(const SceneRun& shown, const TwoRuns& truth, const render::Im
 double worst_pixel(const std::vector<cv::Mat>& electrons, const std::vector<cv::Mat>& true_one,
                    const std::vector<cv::Mat>& true_other, const render::Imager& imager) {
   TS_ASSERT(electrons.size() == true_one.size() && electrons.size() == true_other.size());
-  const std::vector<render::ImagerResponse> responses = responses_of(imager);
+  const std::vector<render::ImagerResponse> responses = render::channel_responses(imager);
   std::vector<double> differences;
   for (std::size_t k = 0; k < electrons.size(); ++k) {
     for_each_value(true_one[k], true_other[k], responses, [&](int row, int i, double noise) {

@@ -14,6 +14,7 @@
 #include "sim/plan/scene_bands.h"
 #include "sim/plan/size_doubt.h"
 #include "sim/scene/device_gel.h"
+#include "sim/scene/device_imager.h"
 #include "sim/scene/translucent_coat.h"
 
 namespace touchstone::sim {
@@ -93,16 +94,45 @@ void plan_elastic_objects(const SceneSpec& scene, Plan& plan, PlanTable& table) 
                 "set-up once an object (seconds, kept in the cache), then some tens of milliseconds a frame");
 }
 
+/// What keeps a scene from being pressed at finite strain; nothing: it can be.
+std::string unfit_for_finite_strain(const SceneSpec& scene, const Plan& plan) {
+  if (!scene.more_objects.empty()) return "several objects";
+  if (plan.elastic_object) return "an elastic object";
+  if (scene.motion.is_turned()) return "motions led by torques";
+  if (plan.inertia) return "inertia";
+  if (scene.device.mesh.force_error) return "a mesh that isn't given by fine_mm";
+  return {};
+}
+
+void plan_finite_strain(const SceneSpec& scene, Plan& plan, PlanTable& table) {
+  const Elasticity asked = scene.effects.elasticity;
+  const std::string unfit = unfit_for_finite_strain(scene, plan);
+  if (asked == Elasticity::neo_hookean && !unfit.empty()) {
+    fail_at(scene.where, "effects.elasticity: neo_hookean can't be had with {} yet", unfit);
+  }
+  const std::string name = "finite strain";
+  const std::string cost =
+      "some five factorisations of the whole gel for every tenth of its thickness: seconds to minutes a frame";
+  if (asked == Elasticity::neo_hookean) {
+    plan.finite_strain = table.add(name, true, "the scene asks for neo-Hookean elasticity", cost);
+    return;
+  }
+  const std::string why = table.accuracy() ? "the gel is stretched"
+                                           : "linear elasticity is the default; where truth's largest strain is above "
+                                             "some 0.2, effects.elasticity: neo_hookean is worth its time (`touchstone "
+                                             "plan --linear-range` tells)";
+  const bool can = asked == Elasticity::automatic && unfit.empty();
+  plan.finite_strain = table.add_by_need(name, can ? Switch::automatic : Switch::off, false, why, cost);
+  const std::optional<Change>& change = plan.effects.back().change;
+  if (!unfit.empty() && asked == Elasticity::automatic && change && exceeds(*change, *table.accuracy())) {
+    plan.warnings.push_back(fmt::format("{} is left out, which changes {}: it can't be had with {} yet", name,
+                                        in_words(*change, *table.accuracy()), unfit));
+  }
+}
+
 void plan_mechanics(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   table.add("gel mechanics", true, "truth is always asked for",
             "set-up once a gel (seconds, kept in the cache), then about a millisecond a frame");
-  plan.finite_strain = table.add(
-      "finite strain", scene.effects.elasticity == Elasticity::neo_hookean,
-      scene.effects.elasticity == Elasticity::neo_hookean
-          ? "the scene asks for neo-Hookean elasticity"
-          : "linear elasticity is the default; where truth's largest strain is above some 0.2, effects.elasticity: "
-            "neo_hookean is worth its time (`touchstone plan --linear-range` tells)",
-      "some five factorisations of the whole gel for every tenth of its thickness: seconds to minutes a frame");
   const std::vector<MovedObject> objects = moved_objects(scene);
   // Of the object whose friction is called for, or else of the first.
   const auto rubs = [](const MovedObject& moved) {
@@ -115,30 +145,23 @@ void plan_mechanics(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   const std::string why = mu == 0.0    ? "the object's friction is 0"
                           : tangential ? fmt::format("the motion has a tangential part and friction is {}", mu)
                                        : "the motion is a straight press: no tangential part, no tilt";
-  plan.friction =
-      table.add("friction", scene.effects.friction, rubbing != objects.end(), why, "a few milliseconds a frame");
+  plan.friction = table.add_by_need("friction", scene.effects.friction, rubbing != objects.end(), why,
+                                    "a few milliseconds a frame");
 
   plan_elastic_objects(scene, plan, table);
-
-  if (plan.finite_strain) {
-    const char* what = objects.size() > 1 ? "several objects" : plan.elastic_object ? "an elastic object" : nullptr;
-    if (what != nullptr) fail_at(scene.where, "effects.elasticity: neo_hookean can't be had with {} yet", what);
-    if (objects.front().motion.is_turned()) {
-      fail_at(scene.where, "effects.elasticity: neo_hookean can't be had with motions led by torques yet");
-    }
-  }
 
   const fem::PronySeries series = prony_series(scene.device.gel);
   const double seconds = (scene.motion.frame_count() - 1) / scene.motion.frame_rate_Hz;
   const bool relaxes = fem::lasting_share(series) < 1.0;
-  plan.relaxation = table.add(
+  const Change faded{.force_percent = 100 * (1.0 - fem::relaxation_at(series, seconds))};
+  plan.relaxation = table.add_by_need(
       "stress relaxation", scene.effects.relaxation, relaxes,
       relaxes
           ? fmt::format("the gel's modulus falls by {:.1f} % within the motion's {:.3g} s and by {:.1f} % in the end",
                         100 * (1.0 - fem::relaxation_at(series, seconds)), seconds,
                         100 * (1.0 - fem::lasting_share(series)))
           : "the gel has no Prony series: it is elastic",
-      "some vectors of the surface's size a frame");
+      "some vectors of the surface's size a frame", faded);
 
   double frequency = 0.0;
   bool turned = false;
@@ -147,7 +170,8 @@ void plan_mechanics(const SceneSpec& scene, Plan& plan, PlanTable& table) {
     turned = turned || moved.motion.is_turned();
   }
   const double missing = inertia_estimate(scene.device.gel, frequency);
-  const bool fast = missing > kAllowedInertia;
+  const double allowed = table.accuracy() ? 0.01 * table.accuracy()->force_percent : kAllowedInertia;
+  const bool fast = missing > allowed;
   const bool inertia = scene.effects.inertia == Switch::automatic ? fast : scene.effects.inertia == Switch::on;
   if (inertia && objects.size() > 1) {
     fail_at(scene.where, "inertia isn't simulated with several objects; effects.inertia: off leaves it out");
@@ -165,14 +189,9 @@ void plan_mechanics(const SceneSpec& scene, Plan& plan, PlanTable& table) {
                        : fmt::format("the motion vibrates at {:.4g} Hz, a layer like the gel has its lowest "
                                      "eigenfrequency at {:.4g} Hz: leaving inertia out errs by up to some {:.2g} % of "
                                      "the vibration's force; allowed is {:.2g} %",
-                                     frequency, frequency / std::sqrt(missing), 100 * missing, 100 * kAllowedInertia),
+                                     frequency, frequency / std::sqrt(missing), 100 * missing, 100 * allowed),
       "the gel's modes once (half a minute, kept in the cache), then milliseconds a frame");
-  if (plan.finite_strain && plan.inertia) {
-    fail_at(scene.where, "effects.elasticity: neo_hookean goes without inertia; switch one of them off");
-  }
-  if (plan.finite_strain && scene.device.mesh.force_error) {
-    fail_at(scene.where, "effects.elasticity: neo_hookean needs a mesh that is given by fine_mm");
-  }
+  plan_finite_strain(scene, plan, table);
 }
 
 /// Finest detail of the object, mm: of its relief, or the middle one of its mesh's edges.
@@ -218,8 +237,12 @@ void plan_relief(const SceneSpec& scene, Plan& plan, PlanTable& table) {
                         *detail, kEdgesADetail, edge)
       : !seen ? "neither a picture nor a height map is asked for"
               : fmt::format("the object has detail of {:.3g} mm, the gel's edges have {:.3g} mm", *detail, edge);
-  plan.fine_relief = table.add("fine relief", scene.effects.fine_relief, (fine && seen) || shows_slopes, why,
-                               fine ? "0.1 to 1 second a frame" : "10 to 50 milliseconds a frame");
+  const std::string cost = fine ? "0.1 to 1 second a frame" : "10 to 50 milliseconds a frame";
+  const bool called_for = (fine && seen) || shows_slopes;
+  // The fine contact answers by linear elasticity: it isn't measured against a finite strain's surface.
+  plan.fine_relief = plan.finite_strain
+                         ? table.add("fine relief", scene.effects.fine_relief, called_for, why, cost)
+                         : table.add_by_need("fine relief", scene.effects.fine_relief, called_for, why, cost);
   if (plan.fine_relief && !scene.more_objects.empty()) {
     fail_at(scene.where, "fine relief isn't simulated with several objects; effects.fine_relief: off leaves it out");
   }
@@ -284,18 +307,23 @@ void plan_interreflection(const SceneSpec& scene, Plan& plan, PlanTable& table) 
       judge(moved.object.radiance ? 0.0 : brightest, bright_radius(moved.object));
     }
   }
-  const std::string why =
-      fmt::format("{} of albedo {:.2g} gives itself {:.1f} % of its light{}; allowed to leave out is {:.1f} %",
-                  device.coating ? "a coating" : "an object", albedo, 100 * gain,
-                  device.coating ? "" : " back through the plate", 100 * scene.light.interreflection_tolerance);
+  const std::string why = fmt::format(
+      "{} of albedo {:.2g} gives itself {:.1f} % of its light{}{}", device.coating ? "a coating" : "an object", albedo,
+      100 * gain, device.coating ? "" : " back through the plate",
+      table.accuracy()
+          ? ""
+          : fmt::format("; allowed to leave out is {:.1f} %", 100 * scene.light.interreflection_tolerance));
   // What the room sends onto a coating is light that only a bounce brings to the camera.
   const bool lit_by_room = device.coating && device.room_radiance.largest() > 0.0;
-  plan.interreflection = table.add("interreflection", scene.effects.interreflection,
-                                   plan.scattering || lit_by_room || gain > scene.light.interreflection_tolerance,
-                                   plan.scattering ? "light is scattered many times in a milky gel"
-                                   : lit_by_room   ? "the room lights the coating"
-                                                   : why,
-                                   "3 to 5 times the rays");
+  const std::string cost = "3 to 5 times the rays";
+  if (plan.scattering || lit_by_room) {
+    plan.interreflection = table.add(
+        "interreflection", scene.effects.interreflection, true,
+        plan.scattering ? "light is scattered many times in a milky gel" : "the room lights the coating", cost);
+    return;
+  }
+  const bool much = gain > scene.light.interreflection_tolerance;
+  plan.interreflection = table.add_by_need("interreflection", scene.effects.interreflection, much, why, cost);
 }
 
 void plan_print(const SceneSpec& scene, Plan& plan, PlanTable& table) {
@@ -326,7 +354,9 @@ void plan_print(const SceneSpec& scene, Plan& plan, PlanTable& table) {
 }
 
 void plan_bands(const SceneSpec& scene, Plan& plan, PlanTable& table) {
-  plan.bands = choose_bands(scene);
+  std::optional<double> tolerance;
+  if (table.accuracy()) tolerance = table.accuracy()->pixel_noise * least_noise_share(*scene.device.camera);
+  plan.bands = choose_bands(scene, tolerance);
   check_light(scene, plan.bands);
   const int count = plan.bands.count();
   const std::string why =
@@ -334,7 +364,7 @@ void plan_bands(const SceneSpec& scene, Plan& plan, PlanTable& table) {
           ? fmt::format(
                 "between {:.4g} and {:.4g} nm they get what a pixel reads wrong by up to {:.2g} % (wanted {:.2g} %)",
                 scene.device.bands->from_nm, scene.device.bands->to_nm, 100 * band_error(scene, plan.bands),
-                100 * scene.device.bands->tolerance)
+                100 * tolerance.value_or(scene.device.bands->tolerance))
           : fmt::format("the device gives its colours as numbers for {}",
                         count == 1 ? "one band" : fmt::format("{} bands", count));
   table.add("spectral bands", true, why, fmt::format("{} band{} a path", count, count == 1 ? "" : "s"));
@@ -350,12 +380,13 @@ void plan_translucent_coating(const SceneSpec& scene, Plan& plan, PlanTable& tab
   }
   const double change = largest_change(translucent_coat(scene, plan.bands));
   const double least = 0.5 / ((1 << device.camera->bits) - 1);
-  plan.translucent_coating = table.add(
+  const Change seen{.pixel_noise = change / least_noise_share(*device.camera)};
+  plan.translucent_coating = table.add_by_need(
       "translucent coating", scene.effects.translucent_coating, change >= least,
       fmt::format(
           "what touches the coating makes it brighter or darker by up to {:.2g} %; half a digital number is {:.2g} %",
           100 * change, 100 * least),
-      "a look-up a hit");
+      "a look-up a hit", seen);
 }
 
 void plan_light(const SceneSpec& scene, Plan& plan, PlanTable& table) {
@@ -437,9 +468,9 @@ double inertia_estimate(const GelSpec& gel, double frequency_Hz) {
   return std::pow(frequency_Hz / lowest, 2);
 }
 
-Plan make_plan(const SceneSpec& scene) {
+Plan make_plan(const SceneSpec& scene, const SceneNeeds& needs) {
   Plan plan;
-  PlanTable table(plan);
+  PlanTable table(plan, accuracy_of(scene.accuracy, scene.device.accuracy), needs);
   plan_mechanics(scene, plan, table);
   plan_relief(scene, plan, table);
   plan_light(scene, plan, table);

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "sim/files/colour.h"
+#include "sim/plan/need.h"
 #include "sim/scene/scene.h"
 
 namespace touchstone::sim {
@@ -14,6 +15,7 @@ struct Effect {
   bool on = false;
   std::string why;
   std::string cost;
+  std::optional<Change> change;  ///< by leaving it out, where that decided
 };
 
 /// What a scene calls for. No code runs for an effect that is off.
@@ -50,9 +52,11 @@ struct Plan {
   std::vector<std::string> warnings;  ///< what is likely a mistake, for people (sim/plan/size_doubt.h)
 };
 
-/// Decides each effect from the scene's own content and from the outputs asked for.
+/// Decides each effect from the scene's own content and from the outputs asked for. Where the scene or its device
+/// states an accuracy, effects are on that change more than it lets out: by a closed form, or as `needs` has it
+/// (sim/need/scene_needs.h); else by fixed shares.
 /// @throws Error if an output can't be had (an image from a device without a camera), or effects that don't go together
-Plan make_plan(const SceneSpec& scene);
+Plan make_plan(const SceneSpec& scene, const SceneNeeds& needs = {});
 
 /// Part of the force that a quasi-static press leaves out at this frequency, (f / f0)^2 with f0 the gel's lowest
 /// eigenfrequency, taken as that of a wide layer: the order of it, from above for a body that rests on the gel.

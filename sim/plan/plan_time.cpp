@@ -66,21 +66,30 @@ void plan_time(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   const char* about = speed.led_by_force ? "some " : "";
   const char* cost = "a picture of what moves for every quarter of a pixel";
 
-  plan.motion_blur = table.add(
-      "motion blur", light ? scene.effects.motion_blur : Switch::automatic, light && blur > sharp,
-      !light ? "no picture is asked for"
-             : fmt::format("in an exposure of {} us the image moves by up to {}{:.2g} pixels; allowed to leave out is "
-                           "{:.2g}",
-                           camera.exposure_us, about, blur, sharp),
-      cost);
-  plan.rolling_shutter = table.add(
+  // Without blur a picture shows the exposure's begin in place of its middle.
+  std::optional<Change> blurred;
+  std::optional<Change> skewed;
+  if (light) {
+    blurred = Change{.marker_px = 0.5 * blur};
+    skewed = Change{.marker_px = skew};
+  }
+  const auto allowed = [&](double pixels) {
+    return table.accuracy() ? "" : fmt::format("; allowed to leave out is {:.2g}", pixels);
+  };
+  plan.motion_blur =
+      table.add_by_need("motion blur", light ? scene.effects.motion_blur : Switch::automatic, light && blur > sharp,
+                        !light ? "no picture is asked for"
+                               : fmt::format("in an exposure of {} us the image moves by up to {}{:.2g} pixels{}",
+                                             camera.exposure_us, about, blur, allowed(sharp)),
+                        cost, blurred);
+  plan.rolling_shutter = table.add_by_need(
       "rolling shutter", light ? scene.effects.rolling_shutter : Switch::automatic, light && skew > tolerance,
       !light                      ? "no picture is asked for"
       : camera.row_time_us == 0.0 ? "the camera exposes all rows at once"
                                   : fmt::format("from the first row to the last the image moves by up to {}{:.2g} "
-                                                "pixels; allowed to leave out is {:.2g}",
-                                                about, skew, tolerance),
-      cost);
+                                                "pixels{}",
+                                                about, skew, allowed(tolerance)),
+      cost, skewed);
   plan.events = table.add("event pixels", scene.outputs.events,
                           scene.outputs.events ? "a stream of events is asked for" : "no events are asked for",
                           "a picture of what changes for every half threshold that a pixel passes");

@@ -131,7 +131,7 @@ LightPaths light_paths(const SceneSpec& scene) {
 
 }  // namespace
 
-SceneBands choose_bands(const SceneSpec& scene) {
+SceneBands choose_bands(const SceneSpec& scene, std::optional<double> tolerance) {
   const DeviceSpec& device = scene.device;
   SceneBands out;
   if (!device.bands) {
@@ -143,8 +143,8 @@ SceneBands choose_bands(const SceneSpec& scene) {
   const LightPaths light = light_paths(scene);
   out.ranges = wanted.count
                    ? render::adapted_bands(light.paths, light.light, wanted.from_nm, wanted.to_nm, *wanted.count)
-                   : render::bands_within(light.paths, light.light, wanted.from_nm, wanted.to_nm, wanted.tolerance,
-                                          render::kBandCounts);
+                   : render::bands_within(light.paths, light.light, wanted.from_nm, wanted.to_nm,
+                                          tolerance.value_or(wanted.tolerance), render::kBandCounts);
   out.centres_nm = out.ranges->centres_nm();
   return out;
 }

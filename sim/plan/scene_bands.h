@@ -10,7 +10,8 @@ namespace touchstone::sim {
 /// that hold the tolerance on every path from a lamp over a coloured thing (twice through the film, if there is one)
 /// into each of the camera's channels.
 /// @throws Error if a lamp or the camera says nothing of the bands' range
-SceneBands choose_bands(const SceneSpec& scene);
+/// @param tolerance in place of the device's `bands.tolerance`
+SceneBands choose_bands(const SceneSpec& scene, std::optional<double> tolerance = {});
 
 /// The largest relative error that the bands make of what a pixel reads; 0 where bands are just numbers.
 double band_error(const SceneSpec& scene, const SceneBands& bands);

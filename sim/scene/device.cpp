@@ -560,6 +560,7 @@ void fields(YamlReader& in, DeviceSpec& device) {
   std::string background, residual;
   in.optional("background", background);
   in.optional("residual", residual);
+  in.optional("accuracy", device.accuracy);
   if (in.describing()) return;  // there is nothing to check
   if (std::ranges::find(render::kBandCounts, static_cast<int>(device.band_wavelengths_nm.size())) ==
       render::kBandCounts.end()) {

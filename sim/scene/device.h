@@ -16,6 +16,7 @@
 #include "render/imager/imager.h"
 #include "render/materials/print.h"
 #include "sim/files/colour.h"
+#include "sim/scene/accuracy.h"
 #include "sim/scene/device_lamps.h"
 #include "sim/scene/event_camera_spec.h"
 #include "sim/scene/residual_map.h"
@@ -283,6 +284,7 @@ struct DeviceSpec {
   /// Empty: none. Pictures then show what it shows where nothing is pressed (sim/sensor/background_light.h).
   cv::Mat background;
   std::shared_ptr<const ResidualMap> residual;  ///< in the file its name, relative to the device file; null: none
+  std::optional<AccuracySpec> accuracy;         ///< of all scenes of the device that don't state their own
   SourceLocation where;
 };
 

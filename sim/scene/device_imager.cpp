@@ -52,6 +52,17 @@ render::Imager imager(const DeviceSpec& device, const SceneBands& bands, bool wi
   return out;
 }
 
+double least_noise_share(const CameraSpec& camera) {
+  render::ImagerResponse response;
+  response.full_well_e = camera.full_well_e;
+  response.dark_e = camera.dark_current_e_per_s * camera.exposure_us / kMicrosecondsPerSecond;
+  response.read_noise_e = camera.read_noise_e;
+  response.quantisation_e = camera.full_well_e / ((1 << camera.bits) - 1 - camera.black_level_DN);
+  // Of a binned picture's pixels green is two samples.
+  const double samples = camera.bayer == render::BayerPattern::binned ? 2.0 : 1.0;
+  return render::noise_e(response, camera.full_well_e) / (camera.full_well_e * std::sqrt(samples));
+}
+
 render::MotionChipSettings motion_chip(const DeviceSpec& device, const SceneBands& bands, bool with_noise) {
   if (!device.camera || !device.camera->motion_chip) {
     fail_at(device.where, "device {}: its camera has no motion_chip", device.name);

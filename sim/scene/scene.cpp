@@ -36,7 +36,7 @@ void fields(YamlReader& in, AddedObject& added) {
 }
 
 EnumNames<Elasticity> enum_names(Elasticity) {
-  return {{"linear", Elasticity::linear}, {"neo_hookean", Elasticity::neo_hookean}};
+  return {{"auto", Elasticity::automatic}, {"linear", Elasticity::linear}, {"neo_hookean", Elasticity::neo_hookean}};
 }
 
 void fields(YamlReader& in, OutputSpec& outputs) {
@@ -112,6 +112,7 @@ void fields(YamlReader& in, SceneSpec& scene) {
   in.optional("light", scene.light);
   in.optional("effects", scene.effects);
   in.optional("membrane", scene.membrane);
+  in.optional("accuracy", scene.accuracy);
   in.optional("lamp_level", scene.lamp_level, Allowed::within(0.0, 1.0));
   in.optional("seed", scene.seed);
 }

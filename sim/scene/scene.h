@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/yaml_reader.h"
+#include "sim/scene/accuracy.h"
 #include "sim/scene/device.h"
 #include "sim/scene/motion.h"
 #include "sim/scene/object.h"
@@ -73,6 +74,7 @@ EnumNames<Switch> enum_names(Switch);
 
 /// How the gel answers to large strain.
 enum class Elasticity {
+  automatic,   ///< finite strain where the plan finds that it matters, else linear
   linear,      ///< fast, and good while PressState::largest_strain is small
   neo_hookean  ///< at finite strain (fem/finite_strain/finite_press.h): seconds a frame
 };
@@ -80,7 +82,7 @@ EnumNames<Elasticity> enum_names(Elasticity);
 
 /// A scene may force an effect on or off; `automatic` leaves it to the plan.
 struct EffectSwitches {
-  Elasticity elasticity = Elasticity::linear;
+  Elasticity elasticity = Elasticity::automatic;
   Switch friction = Switch::automatic;
   Switch elastic_object = Switch::automatic;
   Switch fine_relief = Switch::automatic;
@@ -112,6 +114,8 @@ struct SceneSpec {
   LightSpec light;
   EffectSwitches effects;
   MembraneSpec membrane;
+  /// How exact it has to be; counts more than the device's. If neither states it, the plan goes by fixed shares.
+  std::optional<AccuracySpec> accuracy;
   double lamp_level = 1.0;  ///< the device's lamps are dimmed to this part of their power
   std::uint64_t seed = 0;
   SourceLocation where;

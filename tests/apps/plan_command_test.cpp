@@ -12,6 +12,7 @@
 #include "core/whole_file.h"
 #include "tests/apps/run_program.h"
 #include "tests/support/small_draw.h"
+#include "tests/support/small_job.h"
 #include "tests/support/temporary_folder.h"
 
 namespace touchstone {
@@ -161,6 +162,22 @@ TEST(PlanCommand, SaysThatAStudyByFormulaSimulatesNothing) {
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_EQ(run.out, "study chroma-thickness: 14 designs\nby formula alone: nothing is simulated\n");
   test::expect_refused(run_program({"plan", file, "--linear-range"}), "--linear-range: the study presses nothing");
+}
+
+TEST(PlanCommand, ChecksWhatAScenesPlanGoesBy) {
+  const test::TemporaryFolder folder;
+  const std::string job = test::write_small_job(folder).string();
+  folder.write("scene.yaml", std::string(test::kSmallScene) + "accuracy: {}\n");
+  const std::string cache = (folder.path() / "cache").string();
+  const ProgramRun run =
+      run_program({"--quiet", "--cache", cache, "plan", "--check", (folder.path() / "scene.yaml").string()});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  for (const char* effect : {"friction", "finite strain", "interreflection", "fine relief"}) {
+    EXPECT_GE(count_of(run.out, std::string("\n") + effect), 2u) << effect << " in the plan and in the check\n"
+                                                                 << run.out;
+  }
+  EXPECT_THAT(run.out, AllOf(HasSubstr("leaving it out changes"), HasSubstr("closely"), HasSubstr("verdict")));
+  test::expect_refused(run_program({"plan", "--check", job}), "--check takes a scene's file");
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "datasets/jobs/prepared_job.h"
+#include "datasets/jobs/scene_plan.h"
 #include "tests/support/message_of.h"
 #include "tests/support/small_job.h"
 
@@ -47,6 +48,52 @@ TEST(Job, OutputsOfTheJobReplaceTheScenes) {
     EXPECT_FALSE(scene.plan.camera);
     EXPECT_FALSE(scene.spec.outputs.radiance);
   }
+}
+
+TEST(Job, AccuracyOfTheJobCountsMoreThanTheScenes) {
+  const test::TemporaryFolder folder;
+  test::write_small_job(folder);
+  folder.write("scene.yaml", std::string(test::kSmallScene) + "accuracy: {force_percent: 2, height_um: 9}\n");
+  const auto file = folder.write("job.yaml", std::string(test::kSmallJob) + "accuracy: {force_percent: 3}\n");
+  for (const PreparedScene& scene : prepare_job(file).scenes) {
+    ASSERT_TRUE(scene.spec.accuracy);
+    EXPECT_EQ(scene.spec.accuracy->force_percent, 3.0);
+    EXPECT_EQ(scene.spec.accuracy->height_um, 9.0);
+    EXPECT_FALSE(scene.spec.accuracy->pixel_noise);
+  }
+  EXPECT_THAT(message_of_job(std::string(test::kSmallJob) + "accuracy: {force_percent: 0}\n"),
+              AllOf(HasSubstr("job.yaml:6"), HasSubstr("accuracy.force_percent")));
+}
+
+TEST(Job, NeedsAreKeptByTheContentsOfAllFilesOfAScene) {
+  const test::TemporaryFolder folder;
+  const test::TemporaryFolder cache;
+  const auto file = test::write_small_job(folder);
+  folder.write("job.yaml", std::string(test::kSmallJob) + "accuracy: {pixel_noise: 0.5}\n");
+  const auto kept = [&] {
+    int count = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(cache.path())) {
+      count += entry.path().filename().string().starts_with("need-");
+    }
+    return count;
+  };
+  const auto why_of = [&] {
+    PreparedJob job = prepare_job(file);
+    plan_by_need(job, cache.path());
+    std::string all;
+    for (const PreparedScene& scene : job.scenes) {
+      for (const sim::Effect& effect : scene.plan.effects) all += effect.why + "\n";
+    }
+    return all;
+  };
+  const std::string first = why_of();
+  EXPECT_THAT(first, HasSubstr("(allowed 0.5)"));
+  EXPECT_EQ(kept(), 2) << "the scenes begin in different places";
+  EXPECT_EQ(why_of(), first);
+  EXPECT_EQ(kept(), 2);
+  folder.write("object.yaml", "name: ball\nshape: {type: sphere, radius_mm: 2}\nalbedo: 0\nfriction: 0.5\n");
+  EXPECT_NE(why_of(), first);
+  EXPECT_EQ(kept(), 4);
 }
 
 TEST(Job, InputsAreAllFilesThatItNames) {

@@ -1,0 +1,163 @@
+#include "sim/need/picture_needs.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "core/error.h"
+#include "core/random.h"
+#include "core/units.h"
+#include "render/imager/mean_electrons.h"
+#include "sim/scene/device_camera.h"
+#include "sim/scene/device_imager.h"
+#include "sim/view/pixel_truth.h"
+#include "sim/view/scene_view.h"
+
+namespace touchstone::sim {
+namespace {
+
+constexpr double kAboutContact = 0.5;  // of the contact's radius
+/// From a seed to one that shares no random numbers with it.
+constexpr std::uint64_t kOtherSeed = 0x9e3779b97f4a7c15;
+
+struct Switchable {
+  const char* name;
+  Switch EffectSwitches::*of;
+  bool Plan::*planned;
+};
+constexpr Switchable kSeen[] = {
+    {"interreflection", &EffectSwitches::interreflection, &Plan::interreflection},
+    {"fine relief", &EffectSwitches::fine_relief, &Plan::fine_relief},
+};
+
+/// CV_8U, 255 for so many pixels as are looked at, drawn from those that see the contact or what is about it; of a
+/// picture that doesn't show it from all.
+cv::Mat looked_at(const SceneView& view, const render::Camera& camera, const fem::PressState& press, int pixels) {
+  const std::optional<fem::ReliefAnswer> relief = view.relief(press);
+  OutputSpec contact;
+  contact.contact = true;
+  const cv::Mat touching = pixel_truth(view.geometry(press, relief), camera, contact).image > 0.5;
+  cv::Mat near = touching;
+  const int seen = cv::countNonZero(touching);
+  if (seen == 0) {
+    near = cv::Mat(touching.size(), CV_8U, cv::Scalar(255));
+  } else {
+    const int reach = std::max(1, static_cast<int>(std::lround(kAboutContact * std::sqrt(seen / kPi))));
+    cv::dilate(touching, near, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * reach + 1, 2 * reach + 1}));
+  }
+  std::vector<cv::Point> places;
+  cv::findNonZero(near, places);
+  cv::Mat mask = cv::Mat::zeros(near.size(), CV_8U);
+  RandomStream random(view.scene.seed, 0, Purpose::kSearch);
+  const std::size_t count = std::min(static_cast<std::size_t>(pixels), places.size());
+  for (std::size_t k = 0; k < count; ++k) {
+    const auto left = static_cast<double>(places.size() - k);
+    std::swap(places[k], places[k + static_cast<std::size_t>(random.uniform() * left)]);
+    mask.at<std::uint8_t>(places[k]) = 255;
+  }
+  return mask;
+}
+
+/// Mean electrons of a state, from each of two sets of random numbers.
+using TwoPictures = std::array<cv::Mat, 2>;
+
+TwoPictures pictures_of(const SceneView& view, const render::Camera& camera, const fem::PressState& press,
+                        const cv::Mat& mask, int paths, const std::vector<render::ImagerResponse>& responses) {
+  const render::Tracer tracer = view.tracer(press);
+  render::RenderSettings settings;
+  settings.min_samples = settings.max_samples = paths;
+  TwoPictures pictures;
+  for (std::size_t k = 0; k < pictures.size(); ++k) {
+    settings.seed = view.scene.seed + k * kOtherSeed;
+    pictures[k] = render::mean_electrons(tracer.render(camera, settings, mask).irradiance, responses);
+  }
+  return pictures;
+}
+
+/// Adds up squares of differences over the noise.
+struct NoiseSum {
+  double squares = 0.0;
+  std::int64_t values = 0;
+
+  void add(const TwoPictures& one, const TwoPictures& other, const cv::Mat& mask,
+           const std::vector<render::ImagerResponse>& responses) {
+    const int channels = static_cast<int>(responses.size());
+    for (int row = 0; row < mask.rows; ++row) {
+      for (int column = 0; column < mask.cols; ++column) {
+        if (mask.at<std::uint8_t>(row, column) == 0) continue;
+        for (int c = 0; c < channels; ++c) {
+          const int i = column * channels + c;
+          const render::ImagerResponse& response = responses[static_cast<std::size_t>(c)];
+          const double level = 0.25 * (one[0].ptr<float>(row)[i] + one[1].ptr<float>(row)[i] +
+                                       other[0].ptr<float>(row)[i] + other[1].ptr<float>(row)[i]);
+          if (level >= response.full_well_e) continue;
+          const double noise = render::noise_e(response, level);
+          squares += (one[0].ptr<float>(row)[i] - other[0].ptr<float>(row)[i]) *
+                     (one[1].ptr<float>(row)[i] - other[1].ptr<float>(row)[i]) / (noise * noise);
+          ++values;
+        }
+      }
+    }
+  }
+  double root() const { return values == 0 ? 0.0 : std::sqrt(std::max(0.0, squares / static_cast<double>(values))); }
+};
+
+/// mm: how far the surface's height differs at most with the fine contact and without. @pre `view` has it
+double height_change(const SceneView& view, const fem::PressState& press) {
+  const cv::Mat fine = view.membrane->height(press, view.relief(press));
+  return cv::norm(fine, view.membrane->height(press, {}), cv::NORM_INF);
+}
+
+}  // namespace
+
+void add_picture_needs(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
+                       std::span<const Truth> truths, std::span<const int> frames, const NeedSettings& settings,
+                       SceneNeeds& needs) {
+  if (plan.scattering || frames.empty()) return;
+  const SceneView view(scene, plan, gel);
+  const render::Camera camera = camera_of(*scene.device.camera);
+  const std::vector<render::ImagerResponse> responses =
+      render::channel_responses(imager(scene.device, plan.bands, true));
+  std::vector<cv::Mat> masks;
+  std::vector<TwoPictures> planned;
+  for (const int k : frames) {
+    const fem::PressState& press = truths[static_cast<std::size_t>(k)].press;
+    masks.push_back(looked_at(view, camera, press, settings.pixels));
+    planned.push_back(pictures_of(view, camera, press, masks.back(), settings.paths, responses));
+  }
+  for (const Switchable& one : kSeen) {
+    SceneSpec switched = scene;
+    switched.effects.*one.of = plan.*one.planned ? Switch::off : Switch::on;
+    Plan other;
+    try {
+      other = make_plan(switched);
+    } catch (const Error&) {
+      continue;  // this scene can't have it
+    }
+    EffectNeed need{one.name, {}, {}};
+    try {
+      const SceneView turned(switched, other, gel);
+      NoiseSum sum;
+      for (std::size_t k = 0; k < frames.size(); ++k) {
+        const fem::PressState& press = truths[static_cast<std::size_t>(frames[k])].press;
+        sum.add(planned[k], pictures_of(turned, camera, press, masks[k], settings.paths, responses), masks[k],
+                responses);
+      }
+      need.change = Change{.pixel_noise = sum.root()};
+      const SceneView& fine = plan.fine_relief ? view : turned;
+      if (one.planned == &Plan::fine_relief && (scene.device.coating || scene.outputs.height)) {
+        double most = 0.0;
+        for (const int k : frames) {
+          most = std::max(most, height_change(fine, truths[static_cast<std::size_t>(k)].press));
+        }
+        need.change->height_um = 1e3 * most;
+      }
+    } catch (const Error& error) {
+      need.note = error.what();
+    }
+    needs.push_back(std::move(need));
+  }
+}
+
+}  // namespace touchstone::sim

@@ -1,0 +1,23 @@
+#pragma once
+// What effects of the light and of the seen surface change in pictures.
+
+#include <span>
+
+#include "fem/elements/compliance.h"
+#include "sim/need/scene_needs.h"
+#include "sim/plan/need.h"
+#include "sim/plan/plan.h"
+#include "sim/press/truth.h"
+#include "sim/scene/scene.h"
+
+namespace touchstone::sim {
+
+/// Interreflection and fine relief: some pixels of the states `frames` of `truths` (those of `plan`), traced with each
+/// the other way, from the same random numbers and twice from others, so that what differs is free of their noise on
+/// the mean. Pixels are drawn from those that see the contact, and what is within half of its radius of it.
+/// @pre the plan has a camera
+void add_picture_needs(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
+                       std::span<const Truth> truths, std::span<const int> frames, const NeedSettings& settings,
+                       SceneNeeds& needs);
+
+}  // namespace touchstone::sim

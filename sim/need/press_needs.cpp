@@ -1,0 +1,216 @@
+#include "sim/need/press_needs.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/units.h"
+#include "fem/finite_strain/finite_press.h"
+#include "fem/mesh/gel_body.h"
+#include "sim/need/hard_states.h"
+#include "sim/plan/image_motion.h"
+#include "sim/press/gel_setup.h"
+#include "sim/scene/device_gel.h"
+#include "sim/view/marker_motion.h"
+
+namespace touchstone::sim {
+namespace {
+
+/// Forces smaller than this part of the largest one are judged as if they had it.
+constexpr double kLeastForce = 0.05;
+/// The finite-strain press isn't made on a coarser mesh than this, unless the device's own is: parts of the gel's
+/// thickness and of the contact's radius.
+constexpr double kEdgePerThickness = 0.2;
+constexpr double kEdgePerContact = 0.4;
+/// How far its fine part goes, in the contact's radius, and how coarse the rest may be.
+constexpr double kReachPerContact = 1.5;
+constexpr double kCoarsePerThickness = 0.5;
+/// Of a stage of the finite-strain press: one that takes more has no answer.
+constexpr int kMostFactorisations = 24;
+/// Parts of the way from the first touch to the hardest pose. Where one has no answer, what was found before it is
+/// taken to grow in proportion: strains do.
+constexpr std::array<double, 3> kStages = {0.25, 0.5, 1.0};
+
+/// Two answers to one state.
+struct Pair {
+  const fem::PressState& with;
+  const fem::PressState& without;
+};
+
+/// What a scene's owner would see of a difference of presses on `gel`.
+class PressComparison {
+ public:
+  PressComparison(const SceneSpec& scene, const fem::Compliance& gel)
+      : gel_(gel), heights_(scene.device.coating.has_value() || scene.outputs.height) {
+    if (!scene.device.camera || !scene.outputs.camera()) return;
+    scale_.emplace(scene.device);
+    markers_ = marker_places(scene.device, gel);
+  }
+
+  void add(const Pair& pair, double largest_force) {
+    const auto force = [](const fem::PressState& state) { return Eigen::Vector3d(state.wrench.head<3>()); };
+    const double size = std::max(force(pair.with).norm(), kLeastForce * largest_force);
+    if (size > 0.0) raise(change_.force_percent, 100.0 * (force(pair.with) - force(pair.without)).norm() / size);
+    if (heights_) {
+      const auto rise = pair.with.surface_displacement.col(2) - pair.without.surface_displacement.col(2);
+      raise(change_.height_um, 1e3 * rise.cwiseAbs().maxCoeff());
+    }
+    if (!scale_) return;
+    add_places(pair.with.bead_displacement, pair.without.bead_displacement);
+    if (markers_.rest_mm.rows() > 0) {
+      add_places(marker_displacement(markers_, gel_, pair.with), marker_displacement(markers_, gel_, pair.without));
+    }
+  }
+
+  const Change& change() const { return change_; }
+
+ private:
+  static void raise(std::optional<double>& amount, double to) { amount = std::max(amount.value_or(0.0), to); }
+
+  void add_places(const Eigen::MatrixX3d& one, const Eigen::MatrixX3d& other) {
+    for (Eigen::Index k = 0; k < one.rows(); ++k) {
+      raise(change_.marker_px, scale_->pixels((one.row(k) - other.row(k)).transpose()));
+    }
+  }
+
+  const fem::Compliance& gel_;
+  bool heights_;
+  std::optional<ImageScale> scale_;
+  MarkerPlaces markers_;
+  Change change_;
+};
+
+struct Switchable {
+  const char* name;
+  Switch EffectSwitches::*of;
+  bool Plan::*planned;
+};
+constexpr Switchable kPlayed[] = {
+    {"friction", &EffectSwitches::friction, &Plan::friction},
+    {"elastic object", &EffectSwitches::elastic_object, &Plan::elastic_object},
+};
+
+/// Gives the device a mesh that is fine where `hardest` touches alone: for a press that is about the strain there. With
+/// `edges` of 1 it stays as it is. @returns where the object stands: of a slab, where one place is as good as another,
+/// over its middle
+RigidTransform cut_to_contact(DeviceSpec& device, const fem::PressState& hardest, double edges) {
+  RigidTransform pose = hardest.bodies.front().gel_from_object;
+  if (edges <= 1.0) return pose;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  const double contact = std::sqrt(hardest.contact_area / kPi);
+  MeshSpec& mesh = device.mesh;
+  const double most = std::min(kEdgePerThickness * device.gel.thickness_mm, kEdgePerContact * contact);
+  const double own = mesh.fine_mm;
+  mesh.fine_mm *= std::clamp(most / own, 1.0, edges);
+  mesh.coarse_mm =
+      std::max(mesh.coarse_mm, std::min(edges * mesh.coarse_mm, kCoarsePerThickness * device.gel.thickness_mm));
+  double reach = kReachPerContact * contact + mesh.fine_mm;
+  if (device.gel.slab() != nullptr) {
+    middle.head<2>() = pose.translation.head<2>();
+  } else {
+    reach += pose.translation.head<2>().norm();
+  }
+  mesh.fine_half_extent_mm = mesh.fine_half_extent_mm.cwiseMin(reach);
+  mesh.fine_depth_mm = std::min(mesh.fine_depth_mm, std::max(contact, 2.0 * mesh.fine_mm));
+  pose.translation -= middle;
+  return pose;
+}
+
+Change scaled(Change change, double factor) {
+  for (const auto one : {&Change::force_percent, &Change::pixel_noise, &Change::marker_px, &Change::height_um}) {
+    if (change.*one) change.*one = *(change.*one) * factor;
+  }
+  return change;
+}
+
+double largest_force(std::span<const Truth> truths) {
+  double largest = 0.0;
+  for (const Truth& truth : truths) largest = std::max(largest, truth.press.wrench.head<3>().norm());
+  return largest;
+}
+
+fem::PressTarget target_at(const RigidTransform& pose) {
+  fem::PressTarget target;
+  target.rotation = pose.rotation;
+  for (int a = 0; a < 3; ++a) target.axis[a] = fem::AxisControl::at(pose.translation[a]);
+  return target;
+}
+
+}  // namespace
+
+void add_played_needs(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
+                      std::span<const Truth> truths, std::span<const int> frames, const std::filesystem::path& cache,
+                      SceneNeeds& needs) {
+  for (const Switchable& one : kPlayed) {
+    const bool on = plan.*one.planned;
+    SceneSpec switched = scene;
+    switched.effects.*one.of = on ? Switch::off : Switch::on;
+    Plan other;
+    try {
+      other = make_plan(switched);
+    } catch (const Error&) {
+      continue;  // this scene can't have it
+    }
+    EffectNeed need{one.name, {}, {}};
+    try {
+      const std::vector<Truth> others = play_for_need(switched, other, gel, cache);
+      PressComparison comparison(scene, gel);
+      for (const int k : frames) {
+        const fem::PressState& planned = truths[static_cast<std::size_t>(k)].press;
+        const fem::PressState& turned = others[static_cast<std::size_t>(k)].press;
+        comparison.add(on ? Pair{planned, turned} : Pair{turned, planned}, largest_force(truths));
+      }
+      need.change = comparison.change();
+    } catch (const Error& error) {
+      need.note = error.what();
+    }
+    needs.push_back(std::move(need));
+  }
+}
+
+void add_finite_strain_need(const SceneSpec& scene, const Plan& plan, const Truth& hardest, double edges,
+                            SceneNeeds& needs) {
+  if (!scene.more_objects.empty() || scene.device.mesh.force_error) return;
+  EffectNeed need{"finite strain", {}, {}};
+  try {
+    SceneSpec coarse = scene;
+    const RigidTransform pose = cut_to_contact(coarse.device, hardest.press, edges);
+    const std::vector<fem::ElasticMaterial> materials = gel_materials(coarse.device.gel);
+    const std::vector<fem::Bead> beads = gel_beads(coarse.device);
+    const fem::GelBody body = gel_body(coarse.device);
+    const fem::TetMesh mesh = fem::mesh_gel(body);
+    const fem::Compliance linear_gel = fem::compute_compliance(mesh, materials, beads, fem::thickness_of(body));
+    const fem::FiniteGel finite_gel(mesh, materials, beads, fem::thickness_of(body));
+    const fem::ContactShape shape = coarse_contact_shape(scene.object, coarse.device.mesh.fine_mm);
+    const double friction = plan.friction ? scene.object.friction : 0.0;
+    // Both with whole hats, so that they differ by what the strain makes of them alone.
+    fem::PressTolerance tolerance;
+    tolerance.outlines = false;
+    fem::Press linear(linear_gel, shape, friction, tolerance);
+    tolerance.most_factorisations = kMostFactorisations;
+    fem::FinitePress finite(finite_gel, shape, friction, tolerance);
+    const std::optional<RigidTransform> touching = finite.touching(pose);
+    if (!touching) fail("the object isn't over the gel");
+    for (const double part : kStages) {
+      RigidTransform next = pose;
+      next.translation += (1.0 - part) * (touching->translation - pose.translation);
+      try {
+        linear.step(target_at(next));
+        finite.step(target_at(next));
+      } catch (const Error& error) {
+        need.note = error.what();
+        break;
+      }
+      PressComparison comparison(coarse, linear_gel);
+      comparison.add({finite.state(), linear.state()}, 0.0);
+      need.change = scaled(comparison.change(), 1.0 / part);
+    }
+    if (need.change) need.note.clear();
+  } catch (const Error& error) {
+    need.note = error.what();
+  }
+  needs.push_back(std::move(need));
+}
+
+}  // namespace touchstone::sim

@@ -1,0 +1,27 @@
+#pragma once
+// What effects of the press change: forces, places, heights.
+
+#include <filesystem>
+#include <span>
+#include <vector>
+
+#include "fem/elements/compliance.h"
+#include "sim/plan/need.h"
+#include "sim/plan/plan.h"
+#include "sim/press/truth.h"
+#include "sim/scene/scene.h"
+
+namespace touchstone::sim {
+
+/// Friction and elastic objects: the motion played with each the other way. `truths` are those of `plan`, `frames` the
+/// ones that are compared.
+void add_played_needs(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
+                      std::span<const Truth> truths, std::span<const int> frames, const std::filesystem::path& cache,
+                      SceneNeeds& needs);
+
+/// Finite strain: the scene's object, led to its pose in `hardest` from where it just touches above or below it, by
+/// both theories on one mesh (see NeedSettings::finite_edges).
+void add_finite_strain_need(const SceneSpec& scene, const Plan& plan, const Truth& hardest, double edges,
+                            SceneNeeds& needs);
+
+}  // namespace touchstone::sim

@@ -1,0 +1,153 @@
+#include "sim/plan/need.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "core/error.h"
+#include "sim/plan/plan.h"
+#include "tests/support/message_of.h"
+#include "tests/support/temporary_folder.h"
+
+namespace touchstone::sim {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+SceneSpec shipped(const std::string& name) {
+  return read_scene(std::filesystem::path(TOUCHSTONE_SOURCE_DIR) / "scenes/vhs" / name);
+}
+
+SceneSpec wanted(const std::string& name, Accuracy accuracy = {}) {
+  SceneSpec scene = shipped(name);
+  scene.accuracy =
+      AccuracySpec{accuracy.force_percent, accuracy.pixel_noise, accuracy.marker_px, accuracy.height_um, {}};
+  return scene;
+}
+
+const Effect& effect(const Plan& plan, const std::string& name) {
+  for (const Effect& one : plan.effects) {
+    if (one.name == name) return one;
+  }
+  throw std::runtime_error("no effect " + name);
+}
+
+TEST(Need, TheScenesAccuracyCountsMoreThanTheDevices) {
+  EXPECT_FALSE(accuracy_of({}, {}));
+  const AccuracySpec scene{.force_percent = 2.0};
+  const AccuracySpec device{.force_percent = 3.0, .pixel_noise = 4.0};
+  const Accuracy both = accuracy_of(scene, device).value();
+  EXPECT_EQ(both.force_percent, 2.0);
+  EXPECT_EQ(both.pixel_noise, 4.0);
+  EXPECT_EQ(both.marker_px, 0.05) << "the default";
+  EXPECT_EQ(accuracy_of({}, device)->force_percent, 3.0);
+}
+
+TEST(Need, AnyUnitAboveWhatIsAllowedCallsForTheEffect) {
+  const Accuracy allowed;
+  EXPECT_FALSE(exceeds({}, allowed));
+  EXPECT_FALSE(exceeds({.force_percent = 1.0, .pixel_noise = 0.9}, allowed)) << "as much may be left out";
+  EXPECT_TRUE(exceeds({.force_percent = 0.1, .pixel_noise = 1.1}, allowed));
+  EXPECT_TRUE(exceeds({.marker_px = 0.06}, allowed));
+  EXPECT_TRUE(exceeds({.height_um = 5.1}, allowed));
+  EXPECT_EQ(in_words({}, allowed), "nothing");
+  EXPECT_EQ(in_words({.force_percent = 3.21, .height_um = 2.0}, allowed),
+            "a force by 3.2 % (allowed 1), heights by 2 um (allowed 5)");
+}
+
+TEST(Need, MeasuredChangesDecideWhereAnAccuracyIsStated) {
+  const SceneNeeds much = {{"interreflection", Change{.pixel_noise = 5.3}, ""},
+                           {"finite strain", Change{.force_percent = 6.0}, ""}};
+  const SceneNeeds little = {{"interreflection", Change{.pixel_noise = 0.3}, ""},
+                             {"finite strain", Change{.force_percent = 0.6}, ""}};
+  const SceneSpec scene = wanted("ball-press.yaml");
+  const Plan on = make_plan(scene, much);
+  EXPECT_TRUE(on.interreflection);
+  EXPECT_TRUE(on.finite_strain);
+  EXPECT_THAT(effect(on, "interreflection").why,
+              HasSubstr("leaving it out changes pixels by 5.3 of their noise (allowed 1)"));
+  const Plan off = make_plan(scene, little);
+  EXPECT_FALSE(off.interreflection);
+  EXPECT_FALSE(off.finite_strain);
+  const Plan unstated = make_plan(shipped("ball-press.yaml"), much);
+  EXPECT_FALSE(unstated.finite_strain) << "nobody has said how exact it has to be";
+}
+
+TEST(Need, SwitchesCountMoreAndThePlanSaysWhatTheyLeaveOut) {
+  SceneSpec scene = wanted("ball-press.yaml");
+  scene.effects.interreflection = Switch::off;
+  scene.effects.elasticity = Elasticity::linear;
+  const SceneNeeds needs = {{"interreflection", Change{.pixel_noise = 5.3}, ""},
+                            {"finite strain", Change{.force_percent = 6.0}, ""}};
+  const Plan plan = make_plan(scene, needs);
+  EXPECT_FALSE(plan.interreflection);
+  EXPECT_FALSE(plan.finite_strain);
+  EXPECT_THAT(effect(plan, "interreflection").why,
+              AllOf(HasSubstr("the scene switches it off"), HasSubstr("by 5.3 of their noise")));
+  EXPECT_THAT(effect(plan, "finite strain").why, HasSubstr("a force by 6 %"));
+}
+
+TEST(Need, FiniteStrainThatCantBeHadIsLeftOutWithAWarning) {
+  SceneSpec scene = wanted("ball-press.yaml");
+  scene.more_objects.push_back({scene.object, scene.motion, {}});
+  const Plan plan = make_plan(scene, {{"finite strain", Change{.force_percent = 6.0}, ""}});
+  EXPECT_FALSE(plan.finite_strain);
+  ASSERT_FALSE(plan.warnings.empty());
+  EXPECT_THAT(plan.warnings.front(),
+              AllOf(HasSubstr("finite strain is left out"), HasSubstr("6 %"), HasSubstr("several objects")));
+}
+
+TEST(Need, ClosedFormsAreHeldBesideTheAccuracy) {
+  SceneSpec scene = wanted("ball-press.yaml");
+  scene.device.gel.relaxation = {{0.006, 1e-6}};
+  EXPECT_FALSE(make_plan(scene).relaxation) << "0.6 % of the modulus fades";
+  scene.accuracy->force_percent = 0.5;
+  EXPECT_TRUE(make_plan(scene).relaxation);
+
+  SceneSpec vibrating = wanted("vibration.yaml");
+  EXPECT_TRUE(make_plan(vibrating).inertia) << "3.8 % of the vibration's force";
+  vibrating.accuracy->force_percent = 4.0;
+  EXPECT_FALSE(make_plan(vibrating).inertia);
+
+  SceneSpec moving = wanted("cycle.yaml", {.marker_px = 1e-9});
+  moving.device.camera->row_time_us = 10.0;
+  EXPECT_TRUE(make_plan(moving).motion_blur);
+  EXPECT_TRUE(make_plan(moving).rolling_shutter);
+  moving.accuracy->marker_px = 1000.0;
+  EXPECT_FALSE(make_plan(moving).motion_blur);
+  EXPECT_FALSE(make_plan(moving).rolling_shutter);
+}
+
+TEST(Need, ATightAccuracyOfPixelsTakesMoreBands) {
+  const std::filesystem::path scenes = std::filesystem::path(TOUCHSTONE_SOURCE_DIR) / "scenes";
+  SceneSpec scene = read_scene(scenes / "chroma/ball-press.yaml");
+  scene.device.bands->count.reset();
+  scene.accuracy.emplace().pixel_noise = 1e3;
+  const int few = make_plan(scene).bands.count();
+  scene.accuracy->pixel_noise = 1e-3;
+  EXPECT_GT(make_plan(scene).bands.count(), few);
+}
+
+TEST(Need, AnAccuracyThatMakesNoSenseIsRefusedByFileAndLine) {
+  const std::string scenes = std::string(TOUCHSTONE_SOURCE_DIR) + "/scenes/";
+  const auto refused = [&](const std::string& block) {
+    test::TemporaryFolder folder;
+    const auto file = folder.write("scene.yaml", "device: " + scenes + "devices/vhs.yaml\nobject: " + scenes +
+                                                     "objects/ball-4mm.yaml\nmotion: " + scenes +
+                                                     "motions/press.yaml\naccuracy: " + block + "\n");
+    return test::message_of([&] { read_scene(file); });
+  };
+  for (const char* value : {"0", "-1", ".nan", ".inf", "101"}) {
+    EXPECT_THAT(refused(std::string("{force_percent: ") + value + "}"),
+                AllOf(HasSubstr("scene.yaml:4"), HasSubstr("accuracy.force_percent"), HasSubstr("100")))
+        << value;
+  }
+  EXPECT_THAT(refused("{pixel_noise: -0.5}"), HasSubstr("accuracy.pixel_noise"));
+  EXPECT_THAT(refused("{pixels: 1}"), HasSubstr("pixels"));
+  EXPECT_EQ(refused("{marker_px: 0.1, height_um: 2}"), "no error");
+}
+
+}  // namespace
+}  // namespace touchstone::sim
