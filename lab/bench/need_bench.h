@@ -55,6 +55,7 @@ struct NeedSummary {
   int rightly_on = 0;   ///< which change more than a third of it
   int not_measured = 0;
 };
+/// Over all effects of all runs; one that fails has none.
 NeedSummary summarise(const std::vector<NeedRun>& runs);
 
 }  // namespace touchstone::lab
