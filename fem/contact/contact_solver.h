@@ -59,7 +59,8 @@ struct ContactAnswer {
   int iterations = 0;            ///< systems solved
   int factorisations = 0;
   int sweeps = 0;         ///< of block Gauss-Seidel, where Newton stalled
-  double residual = 0.0;  ///< largest change of a traction by the laws' projection, relative to the largest pressure
+  double residual = 0.0;  ///< largest change of a traction by the laws' projection, relative to the largest pressure;
+                          ///< infinity: there is no answer, `compliance` isn't positive definite
   bool converged = false;
 };
 

@@ -63,6 +63,7 @@ ContactAnswer solve_frictionless(const ContactProblem& problem, const Eigen::Vec
       if (memory.state != wanted) {
         if (!memory.cholesky.compute(a(set, set))) {
           memory.forget();
+          answer.residual = std::numeric_limits<double>::infinity();
           return answer;
         }
         memory.state = std::move(wanted);
@@ -81,7 +82,10 @@ ContactAnswer solve_frictionless(const ContactProblem& problem, const Eigen::Vec
     }
     ++answer.iterations;
     answer.response = times_sparse(a, answer.z);
-    if (!answer.z.allFinite()) return answer;
+    if (!answer.z.allFinite()) {
+      answer.residual = std::numeric_limits<double>::infinity();
+      return answer;
+    }
     const Eigen::VectorXd g = problem.gap + answer.response + problem.border * answer.shift;
     const double largest = answer.z.size() > 0 ? answer.z.cwiseAbs().maxCoeff() : 0.0;
     int violated = 0;

@@ -39,6 +39,17 @@ Eigen::Matrix3d turned_by(const Eigen::Vector3d& turn) {
   return Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix();
 }
 
+/// Why a contact problem of so many candidates has no answer.
+std::string no_answer(const ContactAnswer& answer, std::size_t candidates) {
+  if (!std::isfinite(answer.residual)) {
+    return fmt::format("the contact laws have no answer with {} candidates: their system isn't positive definite",
+                       candidates);
+  }
+  if (answer.residual == 0.0) return fmt::format("none of {} candidates can carry the wanted force", candidates);
+  return fmt::format("the contact laws are met to {:.2g} of the largest pressure only, with {} candidates",
+                     answer.residual, candidates);
+}
+
 }  // namespace
 
 PartSolver::PartSolver(const Compliance& gel, std::vector<PressBody> bodies, double lookup_mm, double traction,
@@ -480,8 +491,7 @@ std::optional<PressSnapshot> PartSolver::solve(const PressSnapshot& from, const 
     effort.factorisations += answer.factorisations;
     effort.sweeps += answer.sweeps;
     if (!answer.converged) {
-      why_not_ = fmt::format("the contact laws are met to {:.2g} of the largest pressure only, with {} candidates",
-                             answer.residual, vertices.size());
+      why_not_ = no_answer(answer, vertices.size());
       return std::nullopt;
     }
     if (c == 1) widen(answer, compliance());

@@ -1,27 +1,12 @@
 #include "fem/finite_strain/linear_range.h"
 
 #include <chrono>
-#include <cmath>
+#include <optional>
 
 #include "core/error.h"
 #include "fem/finite_strain/finite_press.h"
 
 namespace touchstone::fem {
-namespace {
-
-/// The height at which the body, unturned and in the gel's middle, touches the undeformed surface.
-double touching_height(const FiniteGel& gel, const ContactShape& shape) {
-  RigidTransform pose;
-  for (int k = 0; k < 30; ++k) {
-    const double gap = deepest_gap(gel.rest, shape, pose);
-    if (!std::isfinite(gap)) fail("the body isn't over the gel's middle: no reference press can be made");
-    pose.translation.z() -= gap;
-    if (std::abs(gap) < 1e-12 * gel.thickness) break;
-  }
-  return pose.translation.z();
-}
-
-}  // namespace
 
 std::vector<LinearRangeRow> measure_linear_range(const Compliance& linear, const FiniteGel& gel,
                                                  const ContactShape& shape, double friction,
@@ -32,7 +17,9 @@ std::vector<LinearRangeRow> measure_linear_range(const Compliance& linear, const
   Press press(linear, shape, friction, tolerance);
   tolerance.most_factorisations = kRangeFactorisations;
   FinitePress finite(gel, shape, friction, tolerance);
-  const double height = touching_height(gel, shape);
+  const std::optional<RigidTransform> touching = finite.touching(RigidTransform());
+  if (!touching) fail("the body isn't over the gel's middle: no reference press can be made");
+  const double height = touching->translation.z();
   std::vector<LinearRangeRow> range;
   double before = 0.0;
   for (const double part : depths) {

@@ -99,6 +99,17 @@ TEST(Frictionless, WithoutOverlapNobodyCarries) {
   EXPECT_EQ(answer.z.cwiseAbs().maxCoeff(), 0.0);
 }
 
+TEST(Frictionless, ASystemThatIsntPositiveDefiniteHasNoAnswer) {
+  const int m = 10;
+  Eigen::MatrixXd a = random_compliance(m, 5);
+  a(3, 3) = -a(3, 3);
+  const ContactProblem problem = frictionless(a, Eigen::VectorXd::Constant(m, -0.1));
+  ContactMemory memory;
+  const ContactAnswer answer = solve_frictionless(problem, {}, memory);
+  EXPECT_FALSE(answer.converged);
+  EXPECT_EQ(answer.residual, kInfinity) << "not 0, which would say that the laws are met";
+}
+
 /// A patch of a half space in its vertices' own axes, pressed by a paraboloid and dragged along x.
 struct Patch {
   Eigen::MatrixXd a;
