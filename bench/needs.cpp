@@ -118,7 +118,7 @@ int main(int argc, char** argv) {
     const std::filesystem::path scenes = std::filesystem::path(TOUCHSTONE_SOURCE_DIR) / "scenes";
     for (int k = std::max(0, only); k < (only < 0 ? count : only + 1); ++k) {
       looks.trials.push_back(lab::need_trial(scenes, seed, k));
-      looks.runs.push_back(lab::run_need_trial(looks.trials.back(), sim::kCloseLook, cache));
+      looks.runs.push_back(lab::run_need_trial(looks.trials.back(), {}, sim::kCloseLook, cache));
     }
     report.take(totals_table(looks));
     report.take(effects_table(looks));

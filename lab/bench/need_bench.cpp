@@ -65,27 +65,27 @@ NeedTrial need_trial(const std::filesystem::path& scenes, std::uint64_t seed, in
   return trial;
 }
 
-NeedRun run_need_trial(const NeedTrial& trial, const sim::NeedSettings& close, const std::filesystem::path& cache,
-                       const Progress& progress) {
+NeedRun run_need_trial(const NeedTrial& trial, const sim::NeedSettings& first, const sim::NeedSettings& close,
+                       const std::filesystem::path& cache, const Progress& progress) {
   NeedRun run;
   try {
     const auto gel = sim::set_up_gel(trial.scene.device, cache, progress);
     const auto begun = std::chrono::steady_clock::now();
-    const sim::SceneNeeds first = sim::measure_needs(trial.scene, *gel, {}, cache, progress);
+    const sim::SceneNeeds needs = sim::measure_needs(trial.scene, *gel, first, cache, progress);
     run.plan_s = seconds_since(begun);
-    const sim::Plan plan = sim::make_plan(trial.scene, first);
+    const sim::Plan plan = sim::make_plan(trial.scene, needs);
     const auto between = std::chrono::steady_clock::now();
-    const sim::SceneNeeds second = sim::measure_needs(trial.scene, *gel, close, cache, progress);
+    const sim::SceneNeeds closely = sim::measure_needs(trial.scene, *gel, close, cache, progress);
     run.close_s = seconds_since(between);
-    for (const sim::EffectNeed& need : first) {
+    for (const sim::EffectNeed& need : needs) {
       const auto in_plan = std::find_if(plan.effects.begin(), plan.effects.end(),
                                         [&](const sim::Effect& one) { return one.name == need.effect; });
       if (in_plan == plan.effects.end()) continue;
       NeedOutcome outcome{need.effect, in_plan->on, 0.0, 0.0, need.note};
-      const sim::Change* closely = sim::change_of(second, need.effect);
+      const sim::Change* found = sim::change_of(closely, need.effect);
       if (need.change) outcome.planned = over_allowed(*need.change);
-      if (closely != nullptr) outcome.closely = over_allowed(*closely);
-      if (need.change && closely == nullptr) outcome.note = "the closer look has no answer";
+      if (found != nullptr) outcome.closely = over_allowed(*found);
+      if (need.change && found == nullptr) outcome.note = "the closer look has no answer";
       run.effects.push_back(std::move(outcome));
     }
   } catch (const Error& error) {

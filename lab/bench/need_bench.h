@@ -43,9 +43,9 @@ struct NeedRun {
   double close_s = 0.0;
 };
 
-/// Plans the scene by need with the default accuracy and looks at it as `close` says.
-NeedRun run_need_trial(const NeedTrial& trial, const sim::NeedSettings& close, const std::filesystem::path& cache,
-                       const Progress& progress = {});
+/// Plans the scene by what `first` finds with the default accuracy, and looks at it as `close` says.
+NeedRun run_need_trial(const NeedTrial& trial, const sim::NeedSettings& first, const sim::NeedSettings& close,
+                       const std::filesystem::path& cache, const Progress& progress = {});
 
 /// How often the plan was right.
 struct NeedSummary {
