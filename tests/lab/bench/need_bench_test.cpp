@@ -34,18 +34,22 @@ TEST(NeedBench, CountsWhatIsRightlyOutAndRightlyOn) {
 TEST(NeedBench, AFewScenesArePlannedAsTheyAreFound) {
   const test::TemporaryFolder cache;
   std::vector<NeedRun> runs;
-  for (int k = 0; runs.size() < 3 && k < 30; ++k) {
+  for (int k = 0; runs.size() < 2 && k < 30; ++k) {
     const NeedTrial trial = need_trial(kScenes, 1, k);
     if (trial.what.find("gelsight-flat") == std::string::npos) continue;
-    runs.push_back(run_need_trial(trial, {0.0, 128, 32}, {0.0, 1000, 64}, cache.path()));
+    runs.push_back(run_need_trial(trial, {.finite_edges = 0.0}, {0.0, 1000, 128}, cache.path()));
     EXPECT_EQ(runs.back().failure, "") << trial.what;
     EXPECT_GE(runs.back().effects.size(), 2u) << trial.what;
+    // A first look's pixels are few: what is allowed to a fifth may come out on either side.
+    for (const NeedOutcome& one : runs.back().effects) {
+      EXPECT_NEAR(one.planned, one.closely, 0.3 * one.closely) << trial.what << ": " << one.effect;
+    }
   }
-  ASSERT_GE(runs.size(), 2u);
+  ASSERT_EQ(runs.size(), 2u);
   const NeedSummary sum = summarise(runs);
-  EXPECT_EQ(sum.rightly_out, sum.left_out);
   EXPECT_EQ(sum.rightly_on, sum.switched_on);
   EXPECT_GT(sum.switched_on, 0);
+  EXPECT_EQ(sum.not_measured, 0);
 }
 
 }  // namespace
