@@ -5,21 +5,11 @@
 #include "apps/progress_bar.h"
 #include "core/seconds_since.h"
 #include "sim/need/scene_needs.h"
+#include "sim/plan/change_units.h"
 #include "sim/press/gel_setup.h"
 
 namespace touchstone::apps {
 namespace {
-
-/// One unit of a change.
-struct Unit {
-  const char* name;
-  std::optional<double> sim::Change::*of;
-  double sim::Accuracy::*allowed;
-};
-constexpr Unit kUnits[] = {{"force, %", &sim::Change::force_percent, &sim::Accuracy::force_percent},
-                           {"pixels, noise", &sim::Change::pixel_noise, &sim::Accuracy::pixel_noise},
-                           {"places, px", &sim::Change::marker_px, &sim::Accuracy::marker_px},
-                           {"heights, um", &sim::Change::height_um, &sim::Accuracy::height_um}};
 
 struct Look {
   sim::SceneNeeds needs;
@@ -72,9 +62,9 @@ void print_plan_check(const sim::SceneSpec& scene, const sim::Plan& plan, const 
     }
     const bool called_for = sim::exceeds(*found, allowed);
     const char* verdict = on == called_for ? "right" : on ? "could be left out" : "LEFT OUT";
-    for (const Unit& unit : kUnits) {
-      const std::optional<double>& planned = (*need.change).*unit.of;
-      const std::optional<double>& closely = (*found).*unit.of;
+    for (const sim::ChangeUnit& unit : sim::kChangeUnits) {
+      const std::optional<double>& planned = (*need.change).*unit.changed;
+      const std::optional<double>& closely = (*found).*unit.changed;
       if (!planned && !closely) continue;
       fmt::print("{:<16}  {:<3}  {:<14}  {:>8}  {:>8}  {:>8}  {}\n", need.effect, on ? "yes" : "no", unit.name,
                  in_words(planned), in_words(closely), fmt::format("{:.3g}", allowed.*unit.allowed), verdict);

@@ -19,7 +19,9 @@ sim::Plan plan_scene(const sim::SceneSpec& scene, const std::filesystem::path& c
 }
 
 void plan_by_need(PreparedJob& job, const std::filesystem::path& cache, const Progress& progress) {
-  for (PreparedScene& scene : job.scenes) scene.plan = plan_scene(scene.spec, cache, progress);
+  for (PreparedScene& scene : job.scenes) {
+    if (scene.spec.accuracy || scene.spec.device.accuracy) scene.plan = plan_scene(scene.spec, cache, progress);
+  }
 }
 
 }  // namespace touchstone::datasets

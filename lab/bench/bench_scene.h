@@ -11,6 +11,7 @@
 
 #include "fem/contact/press.h"
 #include "render/imager/imager.h"
+#include "sim/need/picture_needs.h"
 #include "sim/scene/scene.h"
 #include "sim/sensor/virtual_sensor.h"
 
@@ -72,8 +73,7 @@ struct SceneRun {
 /// @throws Error as make_plan, sim::play_motion and sim::VirtualCamera
 SceneRun run_scene(const sim::SceneSpec& scene, const fem::Compliance& gel, bool whole = false);
 
-/// From one seed to one that shares no random numbers with it.
-inline constexpr std::uint64_t kOtherSeed = 0x9e3779b97f4a7c15;
+using sim::kOtherSeed;
 
 /// The same twice, with other random numbers the second time; direct light, which has none, is shown once.
 using TwoRuns = std::array<SceneRun, 2>;

@@ -4,6 +4,7 @@
 
 #include "core/error.h"
 #include "lab/bench/device_bench_parts.h"
+#include "sim/need/switched_effect.h"
 #include "sim/plan/plan.h"
 #include "sim/scene/device_imager.h"
 #include "sim/view/visible_scene.h"
@@ -11,12 +12,7 @@
 namespace touchstone::lab {
 namespace {
 
-struct Switchable {
-  const char* name;
-  sim::Switch sim::EffectSwitches::*of;
-  bool sim::Plan::*planned;
-};
-constexpr Switchable kSwitches[] = {
+constexpr sim::SwitchedEffect kSwitches[] = {
     {"friction", &sim::EffectSwitches::friction, &sim::Plan::friction},
     {"fine relief", &sim::EffectSwitches::fine_relief, &sim::Plan::fine_relief},
     {"stress relaxation", &sim::EffectSwitches::relaxation, &sim::Plan::relaxation},
@@ -76,7 +72,7 @@ std::vector<EffectShare> effect_shares(const BenchParts& parts, const Progress& 
   all.seconds = frame_seconds(with);
   all.once_s = once_seconds(with);
   shares.push_back(all);
-  for (const Switchable& one : kSwitches) {
+  for (const sim::SwitchedEffect& one : kSwitches) {
     const bool planned = plan.*one.planned;
     const bool of_pictures = one.of != &sim::EffectSwitches::friction && one.of != &sim::EffectSwitches::relaxation;
     if (of_pictures && !parts.truth) continue;

@@ -12,6 +12,7 @@
 #include "core/seconds_since.h"
 #include "core/units.h"
 #include "lab/bench/bench_scene.h"
+#include "sim/plan/change_units.h"
 #include "sim/press/gel_setup.h"
 
 namespace touchstone::lab {
@@ -31,10 +32,9 @@ constexpr double kWorthIt = 1.0 / 3.0;  // of what is allowed
 double over_allowed(const sim::Change& change) {
   const sim::Accuracy allowed;
   double most = 0.0;
-  most = std::max(most, change.force_percent.value_or(0.0) / allowed.force_percent);
-  most = std::max(most, change.pixel_noise.value_or(0.0) / allowed.pixel_noise);
-  most = std::max(most, change.marker_px.value_or(0.0) / allowed.marker_px);
-  most = std::max(most, change.height_um.value_or(0.0) / allowed.height_um);
+  for (const sim::ChangeUnit& unit : sim::kChangeUnits) {
+    most = std::max(most, (change.*unit.changed).value_or(0.0) / (allowed.*unit.allowed));
+  }
   return most;
 }
 

@@ -9,6 +9,7 @@
 #include "core/random.h"
 #include "core/units.h"
 #include "render/imager/mean_electrons.h"
+#include "sim/need/switched_effect.h"
 #include "sim/scene/device_camera.h"
 #include "sim/scene/device_imager.h"
 #include "sim/view/pixel_truth.h"
@@ -18,15 +19,8 @@ namespace touchstone::sim {
 namespace {
 
 constexpr double kAboutContact = 0.5;  // of the contact's radius
-/// From a seed to one that shares no random numbers with it.
-constexpr std::uint64_t kOtherSeed = 0x9e3779b97f4a7c15;
 
-struct Switchable {
-  const char* name;
-  Switch EffectSwitches::*of;
-  bool Plan::*planned;
-};
-constexpr Switchable kSeen[] = {
+constexpr SwitchedEffect kSeen[] = {
     {"interreflection", &EffectSwitches::interreflection, &Plan::interreflection},
     {"fine relief", &EffectSwitches::fine_relief, &Plan::fine_relief},
 };
@@ -126,18 +120,12 @@ void add_picture_needs(const SceneSpec& scene, const Plan& plan, const fem::Comp
     masks.push_back(looked_at(view, camera, press, settings.pixels));
     planned.push_back(pictures_of(view, camera, press, masks.back(), settings.paths, responses));
   }
-  for (const Switchable& one : kSeen) {
-    SceneSpec switched = scene;
-    switched.effects.*one.of = plan.*one.planned ? Switch::off : Switch::on;
-    Plan other;
-    try {
-      other = make_plan(switched);
-    } catch (const Error&) {
-      continue;  // this scene can't have it
-    }
+  for (const SwitchedEffect& one : kSeen) {
+    const std::optional<SwitchedScene> other = switched(scene, plan, one);
+    if (!other) continue;
     EffectNeed need{one.name, {}, {}};
     try {
-      const SceneView turned(switched, other, gel);
+      const SceneView turned(other->scene, other->plan, gel, view);
       NoiseSum sum;
       for (std::size_t k = 0; k < frames.size(); ++k) {
         const fem::PressState& press = truths[static_cast<std::size_t>(frames[k])].press;

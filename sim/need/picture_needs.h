@@ -1,6 +1,7 @@
 #pragma once
 // What effects of the light and of the seen surface change in pictures.
 
+#include <cstdint>
 #include <span>
 
 #include "fem/elements/compliance.h"
@@ -11,6 +12,9 @@
 #include "sim/scene/scene.h"
 
 namespace touchstone::sim {
+
+/// From a seed to one that shares no random numbers with it.
+inline constexpr std::uint64_t kOtherSeed = 0x9e3779b97f4a7c15;
 
 /// Interreflection and fine relief: some pixels of the states `frames` of `truths` (those of `plan`), traced with each
 /// the other way, from the same random numbers and twice from others, so that what differs is free of their noise on

@@ -9,6 +9,8 @@
 #include "fem/finite_strain/finite_press.h"
 #include "fem/mesh/gel_body.h"
 #include "sim/need/hard_states.h"
+#include "sim/need/switched_effect.h"
+#include "sim/plan/change_units.h"
 #include "sim/plan/image_motion.h"
 #include "sim/press/gel_setup.h"
 #include "sim/scene/device_gel.h"
@@ -81,12 +83,7 @@ class PressComparison {
   Change change_;
 };
 
-struct Switchable {
-  const char* name;
-  Switch EffectSwitches::*of;
-  bool Plan::*planned;
-};
-constexpr Switchable kPlayed[] = {
+constexpr SwitchedEffect kPlayed[] = {
     {"friction", &EffectSwitches::friction, &Plan::friction},
     {"elastic object", &EffectSwitches::elastic_object, &Plan::elastic_object},
 };
@@ -118,8 +115,8 @@ RigidTransform cut_to_contact(DeviceSpec& device, const fem::PressState& hardest
 }
 
 Change scaled(Change change, double factor) {
-  for (const auto one : {&Change::force_percent, &Change::pixel_noise, &Change::marker_px, &Change::height_um}) {
-    if (change.*one) change.*one = *(change.*one) * factor;
+  for (const ChangeUnit& unit : kChangeUnits) {
+    if (change.*unit.changed) *(change.*unit.changed) *= factor;
   }
   return change;
 }
@@ -142,19 +139,13 @@ fem::PressTarget target_at(const RigidTransform& pose) {
 void add_played_needs(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
                       std::span<const Truth> truths, std::span<const int> frames, const std::filesystem::path& cache,
                       SceneNeeds& needs) {
-  for (const Switchable& one : kPlayed) {
+  for (const SwitchedEffect& one : kPlayed) {
     const bool on = plan.*one.planned;
-    SceneSpec switched = scene;
-    switched.effects.*one.of = on ? Switch::off : Switch::on;
-    Plan other;
-    try {
-      other = make_plan(switched);
-    } catch (const Error&) {
-      continue;  // this scene can't have it
-    }
+    const std::optional<SwitchedScene> other = switched(scene, plan, one);
+    if (!other) continue;
     EffectNeed need{one.name, {}, {}};
     try {
-      const std::vector<Truth> others = play_for_need(switched, other, gel, cache);
+      const std::vector<Truth> others = play_for_need(other->scene, other->plan, gel, cache);
       PressComparison comparison(scene, gel);
       for (const int k : frames) {
         const fem::PressState& planned = truths[static_cast<std::size_t>(k)].press;

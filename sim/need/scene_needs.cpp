@@ -9,6 +9,7 @@
 #include "sim/need/hard_states.h"
 #include "sim/need/picture_needs.h"
 #include "sim/need/press_needs.h"
+#include "sim/plan/change_units.h"
 #include "sim/press/gel_setup.h"
 
 namespace touchstone::sim {
@@ -19,23 +20,14 @@ using nlohmann::json;
 /// Raised with each change of how needs are measured, or of their file.
 constexpr int kNeedFormat = 1;
 
-struct Field {
-  const char* name;
-  std::optional<double> Change::*of;
-};
-constexpr Field kFields[] = {{"force_percent", &Change::force_percent},
-                             {"pixel_noise", &Change::pixel_noise},
-                             {"marker_px", &Change::marker_px},
-                             {"height_um", &Change::height_um}};
-
 std::string text_of(const SceneNeeds& needs) {
   json all = json::array();
   for (const EffectNeed& need : needs) {
     json one = {{"effect", need.effect}, {"note", need.note}};
     if (need.change) {
       json change = json::object();
-      for (const Field& field : kFields) {
-        if ((*need.change).*field.of) change[field.name] = *((*need.change).*field.of);
+      for (const ChangeUnit& unit : kChangeUnits) {
+        if ((*need.change).*unit.changed) change[unit.key] = *((*need.change).*unit.changed);
       }
       one["change"] = change;
     }
@@ -56,11 +48,11 @@ std::optional<SceneNeeds> read_needs(const std::filesystem::path& file) {
       EffectNeed need{one.at("effect").get<std::string>(), {}, one.at("note").get<std::string>()};
       if (one.contains("change")) {
         need.change.emplace();
-        for (const Field& field : kFields) {
-          if (!one["change"].contains(field.name)) continue;
-          const double amount = one["change"][field.name].get<double>();
+        for (const ChangeUnit& unit : kChangeUnits) {
+          if (!one["change"].contains(unit.key)) continue;
+          const double amount = one["change"][unit.key].get<double>();
           if (!(amount >= 0.0)) return std::nullopt;
-          (*need.change).*field.of = amount;
+          (*need.change).*unit.changed = amount;
         }
       }
       needs.push_back(std::move(need));
