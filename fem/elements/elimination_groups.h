@@ -33,7 +33,10 @@ class EliminationGroups {
   EliminationGroups(const SymmetricEntries& matrix, int last, const EliminationTree& tree);
 
   std::vector<EliminationGroup>& groups() { return groups_; }
+  const std::vector<EliminationGroup>& groups() const { return groups_; }
   const std::vector<int>& roots() const { return roots_; }
+  /// Of each unknown, its place in the order of elimination.
+  const std::vector<int>& place() const { return place_; }
   /// Row and column of an entry by place.
   std::pair<int, int> places_of(std::size_t entry) const {
     return {place_[matrix_.rows[entry]], place_[matrix_.columns[entry]]};

@@ -5,8 +5,12 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <vector>
 
 extern "C" {
+void dgetrf_(const int* rows, const int* columns, double* matrix, const int* stride, int* pivots, int* info);
+void dgetri_(const int* size, double* matrix, const int* stride, const int* pivots, double* work, const int* length,
+             int* info);
 void dpotrf_(const char* half, const int* size, double* matrix, const int* stride, int* info, std::size_t);
 void dtrsm_(const char* side, const char* half, const char* transposed, const char* unit, const int* rows,
             const int* columns, const double* scale, const double* triangle, const int* triangle_stride, double* right,
@@ -26,6 +30,16 @@ namespace {
 constexpr int kPanel = 192;
 /// Rows and columns of a tile.
 constexpr int kTile = 384;
+
+template <typename Work>
+void each(int count, const Work& work) {
+  if (count <= 1) {
+    for (int k = 0; k < count; ++k) work(k);
+    return;
+  }
+  // Isolated: a thread that waits here must not begin another branch of the tree, whose memory comes on top.
+  tbb::this_task_arena::isolate([&] { tbb::parallel_for(0, count, work); });
+}
 
 /// A front, and which of its pivots have been eliminated.
 class Front {
@@ -47,8 +61,8 @@ class Front {
     each((size_ - to + kTile - 1) / kTile, [&](int tile) {
       const int row = to + tile * kTile;
       const int rows = std::min(kTile, size_ - row);
-      const double one = 1.0;
-      dtrsm_("R", "L", "T", "N", &rows, &width, &one, corner, &size_, at(row, from), &size_, 1, 1, 1, 1);
+      // With the sign here, rows and corner are L of L D L^T; the update below, their square, doesn't see it.
+      dtrsm_("R", "L", "T", "N", &rows, &width, &sign, corner, &size_, at(row, from), &size_, 1, 1, 1, 1);
     });
     update(from, to, sign, to, columns);
     return true;
@@ -89,16 +103,6 @@ class Front {
            at(row, column), &size_, 1, 1);
   }
 
-  template <typename Work>
-  void each(int count, const Work& work) {
-    if (count <= 1) {
-      for (int k = 0; k < count; ++k) work(k);
-      return;
-    }
-    // Isolated: a thread that waits here must not begin another branch of the tree, whose memory comes on top.
-    tbb::this_task_arena::isolate([&] { tbb::parallel_for(0, count, work); });
-  }
-
   double* data_;
   int size_;
 };
@@ -117,6 +121,49 @@ bool eliminate_front(double* data, int size, int positive, int negative) {
   }
   front.update(0, positive, 1.0, pivots, size);
   front.update(positive, pivots, -1.0, pivots, size);
+  return true;
+}
+
+bool eliminate_indefinite_front(double* data, int size, int pivots) {
+  const auto at = [&](std::ptrdiff_t row, std::ptrdiff_t column) { return data + row + column * size; };
+  for (std::ptrdiff_t j = 0; j < pivots; ++j) {
+    for (std::ptrdiff_t i = j + 1; i < pivots; ++i) *at(j, i) = *at(i, j);
+  }
+  std::vector<int> swaps(static_cast<std::size_t>(pivots));
+  int info = 0;
+  dgetrf_(&pivots, &pivots, data, &size, swaps.data(), &info);
+  if (info != 0) return false;
+  const int length = pivots * kPanel;
+  std::vector<double> work(static_cast<std::size_t>(length));
+  dgetri_(&pivots, data, &size, swaps.data(), work.data(), &length, &info);
+  if (info != 0) return false;
+  const int later = size - pivots;
+  if (later == 0) return true;
+  // The rows times the inverse, then out of what is left; both need the rows as they were.
+  const std::vector<double> rows = [&] {
+    std::vector<double> copy(static_cast<std::size_t>(later) * static_cast<std::size_t>(pivots));
+    for (std::ptrdiff_t j = 0; j < pivots; ++j) std::copy_n(at(pivots, j), later, copy.data() + j * later);
+    return copy;
+  }();
+  const double one = 1.0;
+  const double minus = -1.0;
+  const double none = 0.0;
+  const int tiles = (later + kTile - 1) / kTile;
+  each(tiles, [&](int tile) {
+    const int row = tile * kTile;
+    const int count = std::min(kTile, later - row);
+    dgemm_("N", "N", &count, &pivots, &pivots, &one, rows.data() + row, &later, data, &size, &none,
+           at(pivots + row, 0), &size, 1, 1);
+  });
+  each(tiles * tiles, [&](int tile) {
+    const int row = tile / tiles * kTile;
+    const int column = tile % tiles * kTile;
+    if (row < column) return;
+    const int count = std::min(kTile, later - row);
+    const int columns = std::min(kTile, later - column);
+    dgemm_("N", "T", &count, &columns, &pivots, &minus, at(pivots + row, 0), &size, rows.data() + column, &later, &one,
+           at(pivots + row, pivots + column), &size, 1, 1);
+  });
   return true;
 }
 

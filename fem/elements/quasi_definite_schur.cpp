@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "fem/elements/elimination_groups.h"
 #include "fem/elements/front.h"
+#include "fem/elements/front_factors.h"
 #include "fem/elements/number_pool.h"
 #include "fem/elements/row_skeleton.h"
 
@@ -52,13 +53,17 @@ struct Compressed {
 class Elimination {
  public:
   /// `whole`: of the border's last unknowns, whose rows stay as they are while the others' are compressed.
-  Elimination(const SymmetricEntries& matrix, int last, const EliminationTree& tree, std::optional<int> whole = {})
+  /// `kept`: takes each front's factor.
+  Elimination(const SymmetricEntries& matrix, int last, const EliminationTree& tree, std::optional<int> whole = {},
+              FrontFactors* kept = nullptr)
       : matrix_(matrix),
         free_(matrix.size - last),
+        kept_(kept),
         whole_from_(matrix.size - whole.value_or(0)),
         compresses_(whole.has_value()),
         plan_(matrix, last, tree),
         groups_(plan_.groups()) {
+    if (kept_ != nullptr) kept_->set_up(plan_, free_);
     if (!compresses_) return;
     compressed_.resize(groups_.size());
     // Basis vectors have places behind all unknowns.
@@ -156,12 +161,31 @@ class Elimination {
       add(update, place_in_front, front, size);
       pool_.give_back(std::move(update.values));
     }
-    if (!eliminate_front(front, static_cast<int>(size), group.positive, group.negative)) failed_ = true;
+    if (!(kept_ == nullptr ? eliminate_front(front, static_cast<int>(size), group.positive, group.negative)
+                           : eliminate_and_keep(number, front))) {
+      failed_ = true;
+    }
     Update result = left_over(group, front, size);
     pool_.give_back(std::move(memory));
     if (compresses_ && !failed_) compress(number, result);
     group.left = std::ssize(result.rows);
     return result;
+  }
+
+  /// As eliminate_front(), or with pivoting where a sign is wrong.
+  bool eliminate_and_keep(int number, double* front) {
+    const EliminationGroup& group = groups_[number];
+    const auto size = static_cast<int>(group.size);
+    const int pivots = group.positive + group.negative;
+    const auto columns = static_cast<std::size_t>(group.size * pivots);
+    Numbers before = pool_.take(columns);
+    std::copy_n(front, columns, before.get());
+    const bool definite = eliminate_front(front, size, group.positive, group.negative);
+    if (!definite) std::copy_n(before.get(), columns, front);
+    pool_.give_back(std::move(before));
+    if (!definite && !eliminate_indefinite_front(front, size, pivots)) return false;
+    kept_->keep(number, front, !definite);
+    return true;
   }
 
   /// Takes the border's own complement out of what a group leaves, and leaves few combinations of the border's rows.
@@ -281,6 +305,7 @@ class Elimination {
 
   const SymmetricEntries& matrix_;
   int free_;
+  FrontFactors* kept_;
   int whole_from_;
   bool compresses_;
   EliminationGroups plan_;
@@ -334,13 +359,11 @@ HierarchicalMatrix Elimination::compressed(Eigen::MatrixXd& whole_rows) {
   return result;
 }
 
-}  // namespace
-
-std::optional<Eigen::MatrixXd> quasi_definite_schur(const SymmetricEntries& matrix, int last,
-                                                    const EliminationTree& tree, FactorReport* report) {
+std::optional<Eigen::MatrixXd> schur_of(const SymmetricEntries& matrix, int last, const EliminationTree& tree,
+                                        FrontFactors* kept, FactorReport* report) {
   const auto start = std::chrono::steady_clock::now();
   if (openblas_get_num_threads() != 1) openblas_set_num_threads(1);
-  Elimination elimination(matrix, last, tree);
+  Elimination elimination(matrix, last, tree, {}, kept);
   const auto middle = std::chrono::steady_clock::now();
   Eigen::MatrixXd schur = Eigen::MatrixXd::Zero(last, last);
   if (!elimination.run(schur) || !schur.allFinite()) return std::nullopt;
@@ -352,6 +375,33 @@ std::optional<Eigen::MatrixXd> quasi_definite_schur(const SymmetricEntries& matr
     report->factor_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - middle).count();
   }
   return schur;
+}
+
+}  // namespace
+
+std::optional<Eigen::MatrixXd> quasi_definite_schur(const SymmetricEntries& matrix, int last,
+                                                    const EliminationTree& tree, FactorReport* report) {
+  return schur_of(matrix, last, tree, nullptr, report);
+}
+
+FrontalFactor::FrontalFactor() = default;
+FrontalFactor::FrontalFactor(FrontalFactor&&) noexcept = default;
+FrontalFactor& FrontalFactor::operator=(FrontalFactor&&) noexcept = default;
+FrontalFactor::~FrontalFactor() = default;
+
+std::optional<FrontalFactor> FrontalFactor::make(const SymmetricEntries& matrix, int last,
+                                                             const EliminationTree& tree, FactorReport* report) {
+  auto fronts = std::make_unique<FrontFactors>();
+  std::optional<Eigen::MatrixXd> complement = schur_of(matrix, last, tree, fronts.get(), report);
+  if (!complement) return std::nullopt;
+  FrontalFactor result;
+  result.fronts_ = std::move(fronts);
+  result.complement_ = std::move(*complement);
+  return result;
+}
+
+Eigen::VectorXd FrontalFactor::solve(const Eigen::VectorXd& right) const {
+  return fronts_->solve(right);
 }
 
 std::optional<CompressedSchur> compressed_schur(const SymmetricEntries& matrix, int last, int whole,

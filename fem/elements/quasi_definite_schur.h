@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <optional>
 
 #include "fem/elements/elimination_order.h"
@@ -8,6 +9,8 @@
 #include "fem/elements/schur_solver.h"
 
 namespace touchstone::fem {
+
+class FrontFactors;
 
 /// The same Schur complement as schur_complement() for a symmetric quasi-definite matrix: unknowns with a positive
 /// diagonal make a positive definite block, those with a negative one a negative definite block. A multifrontal
@@ -17,6 +20,29 @@ namespace touchstone::fem {
 /// pivoting is needed.
 std::optional<Eigen::MatrixXd> quasi_definite_schur(const SymmetricEntries& matrix, int last,
                                                     const EliminationTree& tree, FactorReport* report = nullptr);
+
+/// The same elimination of any symmetric matrix with the factor kept: a group whose pivots have a wrong sign is
+/// eliminated with pivoting among them. The factor is in single precision: what is solved with it is good to some 1e-5,
+/// enough for the steps of an iteration whose residual is exact.
+class FrontalFactor {
+ public:
+  /// As quasi_definite_schur(); nothing if the pivots of a group are singular.
+  static std::optional<FrontalFactor> make(const SymmetricEntries& matrix, int last, const EliminationTree& tree,
+                                           FactorReport* report = nullptr);
+  FrontalFactor(FrontalFactor&&) noexcept;
+  FrontalFactor& operator=(FrontalFactor&&) noexcept;
+  ~FrontalFactor();
+
+  /// Of the last unknowns, symmetric.
+  const Eigen::MatrixXd& complement() const { return complement_; }
+  /// The solution of the other unknowns' block. The same input gives the same bytes on any number of threads.
+  Eigen::VectorXd solve(const Eigen::VectorXd& right) const;
+
+ private:
+  FrontalFactor();
+  std::unique_ptr<const FrontFactors> fronts_;
+  Eigen::MatrixXd complement_;
+};
 
 /// A Schur complement of which most rows and columns are compressed.
 struct CompressedSchur {

@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "core/error.h"
-#include "fem/elements/elimination_order.h"
 
 namespace touchstone::fem {
 
@@ -14,7 +13,7 @@ FiniteGel::FiniteGel(TetMesh given, std::span<const ElasticMaterial> materials, 
       space(make_space(mesh, materials)),
       problem(space, materials),
       thickness(depth),
-      order(elimination_order(space)),
+      tree(elimination_tree(space)),
       outer(outer_surface(mesh)),
       mass(surface_mass(mesh, outer)),
       coupling(surface_coupling(space, outer)),

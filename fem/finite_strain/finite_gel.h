@@ -6,6 +6,7 @@
 
 #include "fem/contact/contact_gap.h"
 #include "fem/elements/compliance.h"
+#include "fem/elements/elimination_order.h"
 #include "fem/elements/surface_coupling.h"
 #include "fem/finite_strain/finite_strain.h"
 
@@ -22,7 +23,7 @@ struct FiniteGel {
   TaylorHoodSpace space;
   FiniteStrain problem;
   double thickness;
-  std::vector<int> order;  ///< of elimination
+  EliminationTree tree;
   OuterSurface outer;
   Eigen::SparseMatrix<double> mass;                          ///< n x n: int phi_i phi_j dA, mm^2
   Eigen::SparseMatrix<double, Eigen::RowMajor> coupling;     ///< n x nodes: int phi_i N_k dA, mm^2

@@ -11,11 +11,14 @@
 #include "core/error.h"
 #include "fem/contact/tip_gap.h"
 #include "fem/finite_strain/finite_system.h"
+#include "fem/finite_strain/finite_tangent.h"
 
 namespace touchstone::fem {
 namespace {
 
-constexpr int kMostNewton = 25;
+constexpr int kMostNewton = 25;  // with a tangent of their own
+constexpr int kMostSteps = 100;  // with any
+constexpr double kSlow = 0.25;   // of the error before: a tangent that takes off less is made anew
 constexpr int kPlainSteps = 2;    // before Aitken's rule
 constexpr int kTurningSteps = 4;  // after these the lines of contact stay
 constexpr int kMostBacktracks = 5;
@@ -23,7 +26,6 @@ constexpr double kLeastShrink = 0.2;  // of the least J in one Newton step
 constexpr double kLeastRatio = 0.1;   // J: below, elements deform as the gel can't
 constexpr double kBalanced = 1e-8;    // residual over the elements' forces
 constexpr double kAtRest = 1e-4;      // of the elements' forces at a part's start: below, a gel is as good as at rest
-constexpr double kHold = 1000.0;      // stiffness that holds what touches, over the surface's own
 constexpr double kReach = 0.5;        // of a vertex's own size: open gaps below this are candidates
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -214,101 +216,118 @@ double FinitePartSolver::error_of(const FiniteSnapshot& from, const PartTarget& 
   return error;
 }
 
-/// One factorisation, and the contact problem on its Schur complement. False: why_not_ says why.
-bool FinitePartSolver::find_step(const FiniteSnapshot& from, const PartTarget& target, Iterate& iterate, Step& step,
-                                 PartEffort& effort) {
-  const FiniteSnapshot& at = iterate.at;
-  const Scales& scales = gel_.problem.scales();
-  const double unit = force_scale(gel_);
-  const std::vector<int> forced = forced_axes(target);
-  const int c = friction_ > 0.0 ? 3 : 1;
-  const auto m = static_cast<Eigen::Index>(step.block.size());
-  const LawRows laws = law_rows(gel_, at.gap, iterate.axes, step.block, c, forced);
-  Eigen::VectorXd opening(c * m);  // gaps and slips, at this iterate
-  for (Eigen::Index j = 0; j < m; ++j) {
-    const int v = step.block[static_cast<std::size_t>(j)];
-    opening[c * j] = at.gap.weighted[v];
-    if (c == 3) opening.segment<2>(c * j + 1) = slid(from, at, v, iterate.axes[v]);
-  }
+/// Whether the tangent there is can be used for these vertices and forces.
+bool FinitePartSolver::covers(const std::vector<int>& block, const std::vector<int>& forced) const {
+  return tangent_ && tangent_->forced == forced &&
+         std::includes(tangent_->block.begin(), tangent_->block.end(), block.begin(), block.end());
+}
 
-  SymmetricEntries matrix = gel_.problem.tangent(at.elastic);
-  Eigen::VectorXd right(laws.inner);
-  right.head(gel_.space.unknowns) = -iterate.inside;
-  for (std::size_t b = 0; b < forced.size(); ++b) {
-    right[gel_.space.unknowns + static_cast<int>(b)] = -(target.force[forced[b]] + iterate.bulges[forced[b]]) / unit;
-  }
-  // A gel under pressure is stable in the hold of its contact, not under the same pressure as dead load (from a
-  // pressure of some 2 G on). What is held is therefore made stiff, by terms that vanish where it holds (the augmented
-  // Lagrangian of [Hestenes1969] and [Powell1969]), so that the compliance stays positive definite.
-  for (Eigen::Index j = 0; j < m; ++j) {
-    const int v = step.block[static_cast<std::size_t>(j)];
-    if (at.state[v] == NodeState::open) continue;
-    const double stiffness = kHold * scales.stress / std::pow(gel_.rest.weight[v], 1.5) / unit;
-    for (int t = 0; t < (at.state[v] == NodeState::stick ? c : 1); ++t) {
-      const LawRow& row = laws.rows[static_cast<std::size_t>(c * j + t)];
-      for (const auto& [i, x] : row) right[i] -= stiffness * x * opening[c * j + t];
-      add_square(row, stiffness * scales.length, matrix);
+/// Makes the tangent at the iterate, for its candidates and those beside them. False: why_not_ says why.
+bool FinitePartSolver::factorise(const PartTarget& target, const Iterate& iterate, PartEffort& effort) {
+  tangent_.reset();
+  std::vector<int> block = candidates(iterate.at);
+  const std::size_t own = block.size();
+  for (std::size_t k = 0; k < own; ++k) {
+    for (const int u : gel_.rest.around[block[k]]) {
+      if (std::isfinite(iterate.at.gap.weighted[u])) block.push_back(u);
     }
   }
-  add_contact_stiffness(gel_, at.gap, forced, matrix);
-  // The border is scaled to be of the order of one beside the elements' blocks, as in compute_compliance.
-  const double border = std::sqrt(static_cast<double>(gel_.mesh.outer.size())) / (scales.length * scales.length);
-  for (std::size_t r = 0; r < laws.rows.size(); ++r) {
-    for (const auto& [i, x] : laws.rows[r]) matrix.add(i, laws.inner + static_cast<int>(r), border * x);
-  }
-  matrix.size = laws.inner + static_cast<int>(c * m);
-  std::vector<int> order = gel_.order;
-  for (int i = gel_.space.unknowns; i < laws.inner; ++i) order.push_back(i);
-
+  std::sort(block.begin(), block.end());
+  block.erase(std::unique(block.begin(), block.end()), block.end());
   try {
-    BorderedFactor factor(matrix, static_cast<int>(c * m), order);
-    ++effort.factorisations;
-    const Eigen::MatrixXd compliance = factor.complement() * (-scales.length / unit / (border * border));
-    // Where gel and object would go if contact let go at once.
-    const Eigen::VectorXd back = factor.solve(right);
-    Eigen::VectorXd ahead = opening;
-    for (std::size_t r = 0; r < laws.rows.size(); ++r) {
-      for (const auto& [i, x] : laws.rows[r]) ahead[static_cast<Eigen::Index>(r)] += scales.length * x * back[i];
-    }
-    ContactProblem contact;
-    contact.compliance.emplace(compliance);
-    contact.components = c;
-    contact.friction = Eigen::VectorXd::Constant(m, friction_);
-    contact.gap.resize(m);
-    contact.border.resize(c * m, 0);
-    if (c == 3) contact.drag.resize(2 * m);
-    Eigen::VectorXd start(at.touching ? c * m : 0);
-    iterate.tangential_scale = Eigen::VectorXd::Zero(n_);
-    for (Eigen::Index j = 0; j < m; ++j) {
-      const int v = step.block[static_cast<std::size_t>(j)];
-      contact.gap[j] = ahead[c * j];
-      if (at.touching) start[c * j] = at.pressure[v];
-      if (c == 1) continue;
-      contact.drag.segment<2>(2 * j) = -ahead.segment<2>(c * j + 1);
-      iterate.tangential_scale[v] = std::max(compliance(c * j + 1, c * j + 1), compliance(c * j + 2, c * j + 2));
-      if (at.touching) {
-        start.segment<2>(c * j + 1) = iterate.axes[v].rightCols<2>().transpose() * at.shear.row(v).transpose();
-      }
-    }
-    ContactMemory memory;
-    step.answer = c == 1 ? solve_frictionless(contact, start, memory)
-                         : solve_frictional(contact, start, std::max(tolerance_.traction, 1e-10), memory);
-    effort.solves += step.answer.iterations;
-    effort.sweeps += step.answer.sweeps;
-    if (!step.answer.converged) {
-      why_not_ =
-          fmt::format("the contact laws have no answer to be found with {} candidates: the gel isn't stable there", m);
-      return false;
-    }
-    Eigen::VectorXd push = Eigen::VectorXd::Zero(laws.inner);
-    for (std::size_t r = 0; r < laws.rows.size(); ++r) {
-      for (const auto& [i, x] : laws.rows[r]) push[i] += x * step.answer.z[static_cast<Eigen::Index>(r)] / unit;
-    }
-    step.change = back + factor.solve(push);
+    tangent_ = std::make_shared<const FiniteTangent>(finite_tangent(
+        gel_, iterate.at, iterate.axes, std::move(block), friction_ > 0.0 ? 3 : 1, forced_axes(target)));
   } catch (const Error& singular) {
     why_not_ = singular.what();
     return false;
   }
+  ++effort.factorisations;
+  return true;
+}
+
+/// The contact problem on the tangent's compliance. False: why_not_ says why. @pre the tangent covers the block
+bool FinitePartSolver::find_step(const FiniteSnapshot& from, const PartTarget& target, Iterate& iterate, Step& step,
+                                 PartEffort& effort) {
+  const FiniteSnapshot& at = iterate.at;
+  const double length = gel_.problem.scales().length;
+  const double unit = force_scale(gel_);
+  const std::vector<int>& forced = tangent_->forced;
+  const int c = tangent_->components;
+  const auto m = static_cast<Eigen::Index>(step.block.size());
+  const LawRows laws = law_rows(gel_, at.gap, iterate.axes, step.block, c, forced);
+  Eigen::VectorXd opening(c * m);   // gaps and slips, at this iterate
+  Eigen::VectorXd traction(c * m);  // likewise
+  std::vector<int> rows;            // of the tangent's block
+  std::vector<int> held;
+  std::vector<double> stiffness;
+  for (Eigen::Index j = 0; j < m; ++j) {
+    const int v = step.block[static_cast<std::size_t>(j)];
+    const auto place = std::lower_bound(tangent_->block.begin(), tangent_->block.end(), v) - tangent_->block.begin();
+    opening[c * j] = at.gap.weighted[v];
+    traction[c * j] = at.pressure[v];
+    if (c == 3) {
+      opening.segment<2>(c * j + 1) = slid(from, at, v, iterate.axes[v]);
+      traction.segment<2>(c * j + 1) = iterate.axes[v].rightCols<2>().transpose() * at.shear.row(v).transpose();
+    }
+    for (int t = 0; t < c; ++t) {
+      rows.push_back(static_cast<int>(c * place + t));
+      if (at.state[v] == NodeState::open || (at.state[v] == NodeState::slip && t > 0)) continue;
+      held.push_back(static_cast<int>(c * j + t));
+      stiffness.push_back(hold_stiffness(gel_, v));
+    }
+  }
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(laws.inner);
+  const auto push = [&](const Eigen::VectorXd& by) {
+    for (std::size_t r = 0; r < laws.rows.size(); ++r) {
+      for (const auto& [i, x] : laws.rows[r]) right[i] += x * by[static_cast<Eigen::Index>(r)] / unit;
+    }
+  };
+  right.head(gel_.space.unknowns) = -iterate.inside;
+  for (std::size_t b = 0; b < forced.size(); ++b) {
+    right[gel_.space.unknowns + static_cast<int>(b)] = -(target.force[forced[b]] + iterate.bulges[forced[b]]) / unit;
+  }
+  push(traction);
+  // Where gel and object would go with the tractions that there are, and from there without them.
+  const Eigen::VectorXd back = tangent_->factor.solve(right);
+  ContactLaws free{tangent_->compliance(rows, rows), opening};
+  for (std::size_t r = 0; r < laws.rows.size(); ++r) {
+    for (const auto& [i, x] : laws.rows[r]) free.ahead[static_cast<Eigen::Index>(r)] += length * x * back[i];
+  }
+  free.ahead -= free.compliance * traction;
+  ContactLaws stiff = held_stiffly(
+      free, held, Eigen::Map<const Eigen::VectorXd>(stiffness.data(), static_cast<Eigen::Index>(stiffness.size())));
+  const Eigen::VectorXd& ahead = stiff.ahead;
+  ContactProblem contact;
+  contact.compliance.emplace(std::move(stiff.compliance));
+  contact.components = c;
+  contact.friction = Eigen::VectorXd::Constant(m, friction_);
+  contact.gap.resize(m);
+  contact.border.resize(c * m, 0);
+  if (c == 3) contact.drag.resize(2 * m);
+  iterate.tangential_scale = Eigen::VectorXd::Zero(n_);
+  for (Eigen::Index j = 0; j < m; ++j) {
+    contact.gap[j] = ahead[c * j];
+    if (c == 1) continue;
+    const int v = step.block[static_cast<std::size_t>(j)];
+    contact.drag.segment<2>(2 * j) = -ahead.segment<2>(c * j + 1);
+    const Eigen::Index first = c * j + 1;
+    iterate.tangential_scale[v] =
+        std::max(free.compliance(first, first), free.compliance(first + 1, first + 1));
+  }
+  const Eigen::VectorXd start = at.touching ? traction : Eigen::VectorXd();
+  ContactMemory memory;
+  step.answer = c == 1 ? solve_frictionless(contact, start, memory)
+                       : solve_frictional(contact, start, std::max(tolerance_.traction, 1e-10), memory);
+  effort.solves += step.answer.iterations;
+  effort.sweeps += step.answer.sweeps;
+  if (!step.answer.converged) {
+    why_not_ =
+        fmt::format("the contact laws have no answer to be found with {} candidates: the gel isn't stable there", m);
+    return false;
+  }
+  right.setZero();
+  push(step.answer.z - traction);
+  step.change = back + tangent_->factor.solve(right);
   return true;
 }
 
@@ -368,7 +387,9 @@ std::optional<FiniteSnapshot> FinitePartSolver::solve(const FiniteSnapshot& from
   Eigen::VectorXd last_change;
   double factor = 1.0;
   double error = kInfinity;
-  for (int iteration = 1; iteration <= kMostNewton; ++iteration) {
+  bool slow = false;
+  int made = 0;
+  for (int iteration = 1; iteration <= kMostSteps && made <= kMostNewton; ++iteration) {
     Step step;
     step.block = candidates(iterate.at);
     if (step.block.empty()) {
@@ -377,19 +398,30 @@ std::optional<FiniteSnapshot> FinitePartSolver::solve(const FiniteSnapshot& from
       return std::nullopt;
     }
     effort.candidates = std::max(effort.candidates, static_cast<int>(step.block.size()));
-    if (!find_step(from, target, iterate, step, effort)) return std::nullopt;
-    // Aitken's rule [Irons1969] against steps that alternate.
-    double next_factor = 1.0;
-    if (iteration > kPlainSteps) {
-      const double ratio = step.change.dot(last_change) / last_change.squaredNorm();
-      if (ratio < 0.0) next_factor = std::clamp(factor / (1.0 - ratio), 0.1, 1.0);
-    }
-    factor = next_factor;
+    const auto go = [&](bool anew) {
+      if (anew && !factorise(target, iterate, effort)) return false;
+      if (!find_step(from, target, iterate, step, effort)) return false;
+      // Aitken's rule [Irons1969] against steps that alternate.
+      double next_factor = 1.0;
+      if (iteration > kPlainSteps) {
+        const double ratio = step.change.dot(last_change) / last_change.squaredNorm();
+        if (ratio < 0.0) next_factor = std::clamp(factor / (1.0 - ratio), 0.1, 1.0);
+      }
+      if (!take_step(target, step, next_factor, iterate)) return false;
+      factor = next_factor;
+      return true;
+    };
+    // What fails with an old tangent is tried again with a new one.
+    bool anew = slow || !covers(step.block, forced_axes(target));
+    bool gone = go(anew);
+    if (!gone && !anew) gone = go(anew = true);
+    if (!gone) return std::nullopt;
+    made += anew;
     last_change = step.change;
-    if (!take_step(target, step, factor, iterate)) return std::nullopt;
     // How the lines turn, and which of them hit, isn't in the tangent. It hardly matters but at an edge as narrow as
     // the mesh, where Newton's steps may alternate; so the lines stay once they are nearly right.
     evaluate(iteration < kTurningSteps ? nullptr : &iterate.lines, iterate, effort);
+    const double last_error = error;
     error = error_of(from, target, iterate);
     if (error <= 1.0) {
       if (iterate.least < kLeastRatio) {
@@ -407,6 +439,7 @@ std::optional<FiniteSnapshot> FinitePartSolver::solve(const FiniteSnapshot& from
       return std::move(found);
     }
     if (!std::isfinite(iterate.balance)) break;
+    slow = !anew && error > kSlow * last_error;
   }
   why_not_ = fmt::format("Newton's method is {:.2g} times its tolerance off after {} steps", error, kMostNewton);
   return std::nullopt;

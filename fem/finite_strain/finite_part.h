@@ -2,8 +2,10 @@
 // One part of a finite-strain press's path, from a converged state to the next.
 
 #include <Eigen/Core>
+#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/transform.h"
@@ -38,7 +40,12 @@ Eigen::MatrixX3d traction_forces(const FiniteGel& gel, const FiniteSnapshot& at)
 /// The part of these forces that acts against bulging (nodes x 3, N).
 Eigen::MatrixX3d bulge_forces(const FiniteGel& gel, const FiniteSnapshot& at);
 
-/// Newton's method for parts. Keeps nothing between them.
+/// The gel's tangent at some state, factorised, with the compliance of the vertices that may touch there.
+struct FiniteTangent;
+
+/// Newton's method for parts, its tangent held as long as the error falls fast with it: to factorise the gel takes as
+/// long as some ten steps with the factor there is. Residual and gaps are always those of the iterate, so what is
+/// converged to doesn't depend on the tangent's age.
 class FinitePartSolver {
  public:
   /// Of the tolerance, `force`, `lookup_mm` and `traction` count (see FinitePress).
@@ -53,6 +60,10 @@ class FinitePartSolver {
   std::optional<FiniteSnapshot> solve(const FiniteSnapshot& from, const PartTarget& target, PartEffort& effort);
   const std::string& why_not() const { return why_not_; }
 
+  /// The tangent that the next part begins with; nothing: it makes its own. A step that is taken back gives it back.
+  const std::shared_ptr<const FiniteTangent>& tangent() const { return tangent_; }
+  void take_back(std::shared_ptr<const FiniteTangent> tangent) { tangent_ = std::move(tangent); }
+
  private:
   struct Iterate;
   struct Step;
@@ -61,6 +72,8 @@ class FinitePartSolver {
   Eigen::Vector2d slid(const FiniteSnapshot& from, const FiniteSnapshot& at, int vertex,
                        const Eigen::Matrix3d& axes) const;
   double error_of(const FiniteSnapshot& from, const PartTarget& target, const Iterate& iterate) const;
+  bool covers(const std::vector<int>& block, const std::vector<int>& forced) const;
+  bool factorise(const PartTarget& target, const Iterate& iterate, PartEffort& effort);
   bool find_step(const FiniteSnapshot& from, const PartTarget& target, Iterate& iterate, Step& step,
                  PartEffort& effort);
   bool take_step(const PartTarget& target, const Step& step, double& factor, Iterate& iterate);
@@ -70,6 +83,7 @@ class FinitePartSolver {
   double friction_;
   PressTolerance tolerance_;
   int n_;
+  std::shared_ptr<const FiniteTangent> tangent_;
   std::string why_not_;
 };
 

@@ -321,7 +321,14 @@ const PressState& FinitePress::step(const PressTarget& target) {
   check_target(target);
   Parts& p = *parts_;
   Effort effort;
-  FiniteSnapshot next = p.follow(target, effort);
+  const std::shared_ptr<const FiniteTangent> before = p.solver.tangent();
+  FiniteSnapshot next;
+  try {
+    next = p.follow(target, effort);
+  } catch (...) {
+    p.solver.take_back(before);
+    throw;
+  }
   p.now = std::move(next);
   p.placed = true;
   p.state = p.report(p.now);

@@ -1,0 +1,71 @@
+#include "fem/finite_strain/finite_tangent.h"
+
+#include <Eigen/LU>
+#include <cmath>
+#include <utility>
+
+#include "core/error.h"
+#include "fem/finite_strain/finite_system.h"
+
+namespace touchstone::fem {
+namespace {
+
+constexpr double kHold = 1000.0;  // over the surface's own stiffness
+/// Of the gel's own: what an object led by force has as stiffness of its own, so that the tangent isn't singular before
+/// its laws are added. Steps are longer or shorter by it, not what they come to.
+constexpr double kShiftStiffness = 1e-4;
+
+/// The gel's tree with the object's shifts above it.
+EliminationTree with_shifts(EliminationTree tree, int first, int end) {
+  if (first == end) return tree;
+  const int top = static_cast<int>(tree.parent.size());
+  for (int& parent : tree.parent) {
+    if (parent < 0) parent = top;
+  }
+  for (int i = first; i < end; ++i) tree.order.push_back(i);
+  tree.end.push_back(static_cast<int>(tree.order.size()));
+  tree.parent.push_back(-1);
+  return tree;
+}
+
+}  // namespace
+
+FiniteTangent finite_tangent(const FiniteGel& gel, const FiniteSnapshot& at, const std::vector<Eigen::Matrix3d>& axes,
+                             std::vector<int> block, int components, std::vector<int> forced) {
+  const Scales& scales = gel.problem.scales();
+  const LawRows laws = law_rows(gel, at.gap, axes, block, components, forced);
+  SymmetricEntries matrix = gel.problem.tangent(at.elastic);
+  add_contact_stiffness(gel, at.gap, forced, matrix);
+  for (int i = gel.space.unknowns; i < laws.inner; ++i) matrix.add(i, i, kShiftStiffness);
+  // The border is scaled to be of the order of one beside the elements' blocks, as in compute_compliance.
+  const double border = std::sqrt(static_cast<double>(gel.mesh.outer.size())) / (scales.length * scales.length);
+  for (std::size_t r = 0; r < laws.rows.size(); ++r) {
+    for (const auto& [i, x] : laws.rows[r]) matrix.add(i, laws.inner + static_cast<int>(r), border * x);
+  }
+  const auto last = static_cast<int>(laws.rows.size());
+  matrix.size = laws.inner + last;
+  std::optional<FrontalFactor> factor =
+      FrontalFactor::make(matrix, last, with_shifts(gel.tree, gel.space.unknowns, laws.inner));
+  if (!factor) fail("the gel's tangent is singular");
+  Eigen::MatrixXd compliance = factor->complement() * (-scales.length / force_scale(gel) / (border * border));
+  return {std::move(block), std::move(forced), components, std::move(compliance), std::move(*factor)};
+}
+
+double hold_stiffness(const FiniteGel& gel, int vertex) {
+  return kHold * gel.problem.scales().stress / std::pow(gel.rest.weight[vertex], 1.5);
+}
+
+ContactLaws held_stiffly(const ContactLaws& laws, const std::vector<int>& held, const Eigen::VectorXd& stiffness) {
+  if (held.empty()) return laws;
+  // The compliance S of T becomes that of T + B^T k B, B being the held rows: S - S_H (1/k + S_HH)^-1 S_H^T.
+  const Eigen::MatrixXd columns = laws.compliance(Eigen::all, held);
+  Eigen::MatrixXd inner = columns(held, Eigen::all);
+  inner.diagonal() += stiffness.cwiseInverse();
+  const Eigen::PartialPivLU<Eigen::MatrixXd> factor(inner);
+  const Eigen::MatrixXd taken = factor.solve(columns.transpose());
+  ContactLaws stiff{laws.compliance - columns * taken, laws.ahead - taken.transpose() * laws.ahead(held)};
+  stiff.compliance = 0.5 * (stiff.compliance + stiff.compliance.transpose()).eval();
+  return stiff;
+}
+
+}  // namespace touchstone::fem
