@@ -11,10 +11,12 @@ namespace touchstone::fem {
 /// into tiles that oneTBB's threads share. The tiles and the order of sums within each don't depend on the number of
 /// threads. False if a pivot's sign is wrong. @pre OpenBLAS is set to one thread
 bool eliminate_front(double* front, int size, int positive, int negative);
+/// In single precision.
+bool eliminate_front(float* front, int size, int positive, int negative);
 
-/// The same by Gauss's elimination of the pivots' block with partial pivoting in it, whatever its signs: three times the
+/// The same in single precision by Gauss's elimination of the pivots' block with partial pivoting in it, whatever its signs: three times the
 /// work. The columns before are left as the block's inverse (whole) and, below it, the rows times that. False if the
 /// block is singular. @pre OpenBLAS is set to one thread
-bool eliminate_indefinite_front(double* front, int size, int pivots);
+bool eliminate_indefinite_front(float* front, int size, int pivots);
 
 }  // namespace touchstone::fem

@@ -11,9 +11,15 @@ void openblas_set_num_threads(int);
 int openblas_get_num_threads(void);
 void strsv_(const char* half, const char* transposed, const char* unit, const int* size, const float* matrix,
             const int* stride, float* x, const int* step, std::size_t, std::size_t, std::size_t);
+void strsm_(const char* side, const char* half, const char* transposed, const char* unit, const int* rows,
+            const int* columns, const float* scale, const float* triangle, const int* triangle_stride, float* right,
+            const int* stride, std::size_t, std::size_t, std::size_t, std::size_t);
 void sgemv_(const char* transposed, const int* rows, const int* columns, const float* scale, const float* matrix,
             const int* stride, const float* x, const int* x_step, const float* keep, float* y, const int* y_step,
             std::size_t);
+void sgemm_(const char* transposed_a, const char* transposed_b, const int* rows, const int* columns, const int* inner,
+            const float* scale, const float* a, const int* a_stride, const float* b, const int* b_stride,
+            const float* keep, float* c, const int* c_stride, std::size_t, std::size_t);
 }
 
 namespace touchstone::fem {
@@ -22,9 +28,41 @@ namespace {
 /// Numbers of a branch from which on it is worth a task.
 constexpr double kWorthATask = 1e6;
 constexpr int kOne = 1;
-constexpr float kNone = 0.0f;
 constexpr float kPlus = 1.0f;
-constexpr float kMinus = -1.0f;
+
+/// Some columns of right-hand sides, and the rows from one on.
+struct RightSides {
+  float* data;
+  int columns;
+  int stride;
+};
+
+/// x = L^-1 x, or L^-T x. One column goes by matrix and vector, which packs nothing.
+void solve_triangle(bool transposed, int size, const float* matrix, int stride, const RightSides& x) {
+  const char* t = transposed ? "T" : "N";
+  if (x.columns == 1) {
+    strsv_("L", t, "N", &size, matrix, &stride, x.data, &kOne, 1, 1, 1);
+  } else {
+    strsm_("L", "L", t, "N", &size, &x.columns, &kPlus, matrix, &stride, x.data, &x.stride, 1, 1, 1, 1);
+  }
+}
+
+/// y = keep y + scale A x, or A^T x, A being rows x columns.
+void multiply(bool transposed, int rows, int columns, float scale, const float* matrix, int stride, const RightSides& x,
+              float keep, const RightSides& y) {
+  const char* t = transposed ? "T" : "N";
+  if (x.columns == 1) {
+    sgemv_(t, &rows, &columns, &scale, matrix, &stride, x.data, &kOne, &keep, y.data, &kOne, 1);
+  } else {
+    const int from = transposed ? rows : columns;
+    const int to = transposed ? columns : rows;
+    sgemm_(t, "N", &to, &x.columns, &from, &scale, matrix, &stride, x.data, &x.stride, &keep, y.data, &y.stride, 1, 1);
+  }
+}
+
+RightSides right_sides(Eigen::MatrixXf& x, int first = 0) {
+  return {x.data() + first, static_cast<int>(x.cols()), static_cast<int>(x.rows())};
+}
 
 }  // namespace
 
@@ -60,22 +98,23 @@ void FrontFactors::set_up(const EliminationGroups& plan, int free) {
   }
 }
 
-void FrontFactors::keep(int group, const double* values, bool indefinite) {
+void FrontFactors::keep(int group, const float* values, bool indefinite) {
   Front& front = fronts_[static_cast<std::size_t>(group)];
   front.indefinite = indefinite;
   const auto rows = static_cast<std::ptrdiff_t>(front.pivots) + std::ssize(front.later);
   front.columns.resize(static_cast<std::size_t>(rows * front.pivots));
   for (std::ptrdiff_t j = 0; j < front.pivots; ++j) {
     const std::ptrdiff_t from = indefinite ? 0 : j;
-    std::transform(values + j * front.stride + from, values + j * front.stride + rows,
-                   front.columns.begin() + j * rows + from, [](double value) { return static_cast<float>(value); });
+    std::copy(values + j * front.stride + from, values + j * front.stride + rows,
+              front.columns.begin() + j * rows + from);
   }
 }
 
-/// L y = x for a branch: y takes the place of x, but where a front's pivots are indefinite. @returns what it takes from later places
-std::vector<float> FrontFactors::forward(int number, std::vector<float>& x) const {
+/// L y = x for a branch: y takes the place of x, but where a front's pivots are indefinite. @returns what it takes from
+/// later places
+Eigen::MatrixXf FrontFactors::forward(int number, Eigen::MatrixXf& x) const {
   const Front& front = fronts_[static_cast<std::size_t>(number)];
-  std::vector<std::vector<float>> updates(front.children.size());
+  std::vector<Eigen::MatrixXf> updates(front.children.size());
   const auto child = [&](std::size_t k) { updates[k] = forward(front.children[k], x); };
   if (front.numbers > kWorthATask && updates.size() > 1) {
     tbb::parallel_for(std::size_t{0}, updates.size(), child);
@@ -84,45 +123,46 @@ std::vector<float> FrontFactors::forward(int number, std::vector<float>& x) cons
   }
   const int pivots = front.pivots;
   const int later = static_cast<int>(front.later.size());
-  const int rows = pivots + later;
-  float* const own = x.data() + front.first;
-  std::vector<float> rest(front.later.size(), 0.0f);
+  Eigen::MatrixXf rest = Eigen::MatrixXf::Zero(later, x.cols());
   for (std::size_t k = 0; k < updates.size(); ++k) {
-    for (std::size_t i = 0; i < updates[k].size(); ++i) {
-      const int row = front.rows_of_child[k][i];
-      (row < pivots ? own[row] : rest[static_cast<std::size_t>(row - pivots)]) += updates[k][i];
+    for (Eigen::Index i = 0; i < updates[k].rows(); ++i) {
+      const int row = front.rows_of_child[k][static_cast<std::size_t>(i)];
+      if (row < pivots) {
+        x.row(front.first + row) += updates[k].row(i);
+      } else {
+        rest.row(row - pivots) += updates[k].row(i);
+      }
     }
   }
   if (pivots == 0) return rest;
-  if (!front.indefinite) strsv_("L", "N", "N", &pivots, front.columns.data(), &rows, own, &kOne, 1, 1, 1);
+  const RightSides own = right_sides(x, front.first);
+  if (!front.indefinite) solve_triangle(false, pivots, front.columns.data(), pivots + later, own);
   if (later > 0) {
-    sgemv_("N", &later, &pivots, &kMinus, front.columns.data() + pivots, &rows, own, &kOne, &kPlus, rest.data(), &kOne,
-           1);
+    multiply(false, later, pivots, -1.0f, front.columns.data() + pivots, pivots + later, own, 1.0f, right_sides(rest));
   }
   return rest;
 }
 
 /// D L^T x = y for a branch whose later places are known.
-void FrontFactors::backward(int number, std::vector<float>& x) const {
+void FrontFactors::backward(int number, Eigen::MatrixXf& x) const {
   const Front& front = fronts_[static_cast<std::size_t>(number)];
   const int pivots = front.pivots;
   const int later = static_cast<int>(front.later.size());
-  const int rows = pivots + later;
   if (pivots > 0) {
-    float* const own = x.data() + front.first;
+    const RightSides own = right_sides(x, front.first);
+    const float* const columns = front.columns.data();
     if (front.indefinite) {
-      const std::vector<float> right(own, own + pivots);
-      sgemv_("N", &pivots, &pivots, &kPlus, front.columns.data(), &rows, right.data(), &kOne, &kNone, own, &kOne, 1);
+      Eigen::MatrixXf right = x.middleRows(front.first, pivots);
+      multiply(false, pivots, pivots, 1.0f, columns, pivots + later, right_sides(right), 0.0f, own);
     } else {
-      for (int k = front.positive; k < pivots; ++k) own[k] = -own[k];
+      x.middleRows(front.first + front.positive, pivots - front.positive) *= -1.0f;
     }
     if (later > 0) {
-      std::vector<float> known(front.later.size());
-      for (std::size_t k = 0; k < known.size(); ++k) known[k] = x[static_cast<std::size_t>(front.later[k])];
-      sgemv_("T", &later, &pivots, &kMinus, front.columns.data() + pivots, &rows, known.data(), &kOne, &kPlus, own,
-             &kOne, 1);
+      Eigen::MatrixXf known(later, x.cols());
+      for (int k = 0; k < later; ++k) known.row(k) = x.row(front.later[static_cast<std::size_t>(k)]);
+      multiply(true, later, pivots, -1.0f, columns + pivots, pivots + later, right_sides(known), 1.0f, own);
     }
-    if (!front.indefinite) strsv_("L", "T", "N", &pivots, front.columns.data(), &rows, own, &kOne, 1, 1, 1);
+    if (!front.indefinite) solve_triangle(true, pivots, columns, pivots + later, own);
   }
   const auto child = [&](std::size_t k) { backward(front.children[k], x); };
   if (front.numbers > kWorthATask && front.children.size() > 1) {
@@ -132,21 +172,21 @@ void FrontFactors::backward(int number, std::vector<float>& x) const {
   }
 }
 
-Eigen::VectorXd FrontFactors::solve(const Eigen::VectorXd& right) const {
-  TS_ASSERT(right.size() == std::ssize(place_));
-  // Forces span orders of magnitude that single precision's exponents have; scaled, they stay among them.
-  const double scale = right.cwiseAbs().maxCoeff();
+Eigen::MatrixXd FrontFactors::solve(const Eigen::MatrixXd& right) const {
+  TS_ASSERT(right.rows() == std::ssize(place_));
   if (openblas_get_num_threads() != 1) openblas_set_num_threads(1);
-  if (scale == 0.0) return Eigen::VectorXd::Zero(right.size());
-  std::vector<float> x(place_.size());
-  for (std::size_t i = 0; i < place_.size(); ++i) {
-    x[static_cast<std::size_t>(place_[i])] = static_cast<float>(right[static_cast<Eigen::Index>(i)] / scale);
+  // Scaled, so that single precision's exponents have them.
+  Eigen::VectorXd scale = right.cwiseAbs().colwise().maxCoeff().transpose();
+  for (double& one : scale) one = one > 0.0 ? one : 1.0;
+  Eigen::MatrixXf x(right.rows(), right.cols());
+  for (Eigen::Index i = 0; i < right.rows(); ++i) {
+    x.row(place_[static_cast<std::size_t>(i)]) = right.row(i).cwiseQuotient(scale.transpose()).cast<float>();
   }
   for (const int root : roots_) forward(root, x);
   for (const int root : roots_) backward(root, x);
-  Eigen::VectorXd result(right.size());
-  for (std::size_t i = 0; i < place_.size(); ++i) {
-    result[static_cast<Eigen::Index>(i)] = scale * static_cast<double>(x[static_cast<std::size_t>(place_[i])]);
+  Eigen::MatrixXd result(right.rows(), right.cols());
+  for (Eigen::Index i = 0; i < right.rows(); ++i) {
+    result.row(i) = x.row(place_[static_cast<std::size_t>(i)]).cast<double>().cwiseProduct(scale.transpose());
   }
   return result;
 }

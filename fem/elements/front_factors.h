@@ -17,9 +17,10 @@ class FrontFactors {
   void set_up(const EliminationGroups& plan, int free);
   /// Takes a group's front as eliminate_front() leaves it, or eliminate_indefinite_front(). Different groups may be kept
   /// at once by several threads.
-  void keep(int group, const double* front, bool indefinite);
-  /// The solution of what was eliminated, by branches of the tree that threads share. @pre all groups are kept
-  Eigen::VectorXd solve(const Eigen::VectorXd& right) const;
+  void keep(int group, const float* front, bool indefinite);
+  /// The solutions of what was eliminated, one a column, by branches of the tree that threads share. @pre all groups
+  /// are kept
+  Eigen::MatrixXd solve(const Eigen::MatrixXd& right) const;
 
  private:
   struct Front {
@@ -34,8 +35,8 @@ class FrontFactors {
     std::vector<float> columns;                   ///< (pivots + later) x pivots
     double numbers = 0.0;                         ///< of `columns`, with its branch
   };
-  std::vector<float> forward(int number, std::vector<float>& x) const;
-  void backward(int number, std::vector<float>& x) const;
+  Eigen::MatrixXf forward(int number, Eigen::MatrixXf& x) const;
+  void backward(int number, Eigen::MatrixXf& x) const;
 
   std::vector<Front> fronts_;
   std::vector<int> roots_;

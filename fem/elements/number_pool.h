@@ -35,6 +35,11 @@ class Numbers {
   }
 
   double* get() const { return data_; }
+  /// The same memory for numbers of another precision.
+  template <typename Real>
+  Real* as() const {
+    return reinterpret_cast<Real*>(data_);
+  }
   std::size_t bytes() const { return count_ * sizeof(double); }
 
  private:

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -50,10 +51,12 @@ struct Compressed {
   RowSkeleton skeleton;
 };
 
+/// In double precision, or in single precision with the factors kept.
+template <typename Real>
 class Elimination {
  public:
   /// `whole`: of the border's last unknowns, whose rows stay as they are while the others' are compressed.
-  /// `kept`: takes each front's factor.
+  /// `kept`: takes each front's factor; null in double precision.
   Elimination(const SymmetricEntries& matrix, int last, const EliminationTree& tree, std::optional<int> whole = {},
               FrontFactors* kept = nullptr)
       : matrix_(matrix),
@@ -80,7 +83,7 @@ class Elimination {
       const Update update = eliminate(root);
       if (failed_) return false;
       const auto size = static_cast<std::ptrdiff_t>(update.rows.size());
-      const double* value = update.values.get();
+      const Real* value = update.values.as<Real>();
       for (std::ptrdiff_t j = 0; j < size; ++j) {
         for (std::ptrdiff_t i = j; i < size; ++i) schur(update.rows[i] - free_, update.rows[j] - free_) += *value++;
       }
@@ -99,7 +102,7 @@ class Elimination {
       const Update update = eliminate(root);
       if (failed_) return false;
       const auto size = static_cast<std::ptrdiff_t>(update.rows.size());
-      const double* value = update.values.get();
+      const Real* value = update.values.as<Real>();
       for (std::ptrdiff_t j = 0; j < size; ++j) {
         for (std::ptrdiff_t i = j; i < size; ++i) {
           whole(update.rows[i] - whole_from_, update.rows[j] - whole_from_) += *value++;
@@ -119,7 +122,7 @@ class Elimination {
     }
     for (const int root : plan_.roots()) {
       report.operations += groups_[root].work;
-      report.memory_mb = std::max(report.memory_mb, sizeof(double) * peak(root) / 1e6);
+      report.memory_mb = std::max(report.memory_mb, sizeof(Real) * peak(root) / 1e6);
     }
   }
 
@@ -143,9 +146,9 @@ class Elimination {
 
     const auto size = static_cast<std::ptrdiff_t>(group.rows.size());
     group.size = size;
-    Numbers memory = pool_.take(static_cast<std::size_t>(size * size));
-    double* const front = memory.get();
-    each(size, [&](std::ptrdiff_t j) { std::fill(front + j * size + j, front + (j + 1) * size, 0.0); });
+    Numbers memory = take(size * size);
+    Real* const front = memory.as<Real>();
+    each(size, [&](std::ptrdiff_t j) { std::fill(front + j * size + j, front + (j + 1) * size, Real(0)); });
     const auto place_in_front = [&](int place) {
       const auto pivots = static_cast<std::ptrdiff_t>(group.positive + group.negative);
       if (place < group.first + pivots) return static_cast<std::ptrdiff_t>(place - group.first);
@@ -155,16 +158,13 @@ class Elimination {
       const auto [row, column] = plan_.places_of(entry);
       const std::ptrdiff_t i = place_in_front(std::max(row, column));
       const std::ptrdiff_t j = place_in_front(std::min(row, column));
-      front[i + j * size] += matrix_.values[entry];
+      front[i + j * size] += static_cast<Real>(matrix_.values[entry]);
     }
     for (Update& update : updates) {
       add(update, place_in_front, front, size);
       pool_.give_back(std::move(update.values));
     }
-    if (!(kept_ == nullptr ? eliminate_front(front, static_cast<int>(size), group.positive, group.negative)
-                           : eliminate_and_keep(number, front))) {
-      failed_ = true;
-    }
+    if (!eliminate_own(number, front)) failed_ = true;
     Update result = left_over(group, front, size);
     pool_.give_back(std::move(memory));
     if (compresses_ && !failed_) compress(number, result);
@@ -172,20 +172,29 @@ class Elimination {
     return result;
   }
 
-  /// As eliminate_front(), or with pivoting where a sign is wrong.
-  bool eliminate_and_keep(int number, double* front) {
+  /// Eliminates a group's own unknowns from its front. Where factors are kept with pivoting if a sign is wrong.
+  bool eliminate_own(int number, Real* front) {
     const EliminationGroup& group = groups_[number];
     const auto size = static_cast<int>(group.size);
-    const int pivots = group.positive + group.negative;
-    const auto columns = static_cast<std::size_t>(group.size * pivots);
-    Numbers before = pool_.take(columns);
-    std::copy_n(front, columns, before.get());
-    const bool definite = eliminate_front(front, size, group.positive, group.negative);
-    if (!definite) std::copy_n(before.get(), columns, front);
-    pool_.give_back(std::move(before));
-    if (!definite && !eliminate_indefinite_front(front, size, pivots)) return false;
-    kept_->keep(number, front, !definite);
-    return true;
+    if constexpr (std::is_same_v<Real, double>) {
+      return eliminate_front(front, size, group.positive, group.negative);
+    } else {
+      const int pivots = group.positive + group.negative;
+      const std::ptrdiff_t columns = group.size * pivots;
+      Numbers before = take(columns);
+      std::copy_n(front, columns, before.as<Real>());
+      const bool definite = eliminate_front(front, size, group.positive, group.negative);
+      if (!definite) std::copy_n(before.as<Real>(), columns, front);
+      pool_.give_back(std::move(before));
+      if (!definite && !eliminate_indefinite_front(front, size, pivots)) return false;
+      kept_->keep(number, front, !definite);
+      return true;
+    }
+  }
+
+  /// At least `count` of its numbers.
+  Numbers take(std::ptrdiff_t count) {
+    return pool_.take((static_cast<std::size_t>(count) * sizeof(Real) + sizeof(double) - 1) / sizeof(double));
   }
 
   /// Takes the border's own complement out of what a group leaves, and leaves few combinations of the border's rows.
@@ -207,13 +216,13 @@ class Elimination {
     const std::ptrdiff_t size = std::ssize(update.rows);
     const auto value = [&](std::ptrdiff_t i, std::ptrdiff_t j) {
       const auto [low, high] = std::minmax(i, j);
-      return update.values.get()[low * size - low * (low - 1) / 2 + high - low];
+      return update.values.as<Real>()[low * size - low * (low - 1) / 2 + high - low];
     };
     Compressed found;
     RowSkeleton& few = found.skeleton;
     if (later > 0) {
       double largest = 0.0;
-      for (const std::ptrdiff_t k : members) largest = std::max(largest, std::abs(value(k, k)));
+      for (const std::ptrdiff_t k : members) largest = std::max(largest, static_cast<double>(std::abs(value(k, k))));
       Eigen::MatrixXd rows(count, later);
       Eigen::VectorXd scale(later);
       for (std::ptrdiff_t j = 0; j < later; ++j) {
@@ -241,12 +250,12 @@ class Elimination {
     Update less;
     for (const std::ptrdiff_t k : kept) less.rows.push_back(update.rows[k]);
     for (std::ptrdiff_t k = 0; k < rank; ++k) less.rows.push_back(first_basis_[number] + static_cast<int>(k));
-    less.values = pool_.take(static_cast<std::size_t>(packed(keep + rank)));
-    double* to = less.values.get();
+    less.values = take(packed(keep + rank));
+    Real* to = less.values.as<Real>();
     for (std::ptrdiff_t j = 0; j < keep + rank; ++j) {
       for (std::ptrdiff_t i = j; i < keep; ++i) *to++ = value(kept[i], kept[j]);
       for (std::ptrdiff_t i = std::max(j, keep); i < keep + rank; ++i)
-        *to++ = j < later ? value(members[few.kept[i - keep]], kept[j]) : 0.0;
+        *to++ = j < later ? value(members[few.kept[i - keep]], kept[j]) : Real(0);
     }
     compressed_[number] = std::move(found);
     pool_.give_back(std::move(update.values));
@@ -255,26 +264,26 @@ class Elimination {
 
   /// Adds a child's update to its parent's front.
   template <typename Place>
-  void add(const Update& update, const Place& place, double* front, std::ptrdiff_t size) const {
+  void add(const Update& update, const Place& place, Real* front, std::ptrdiff_t size) const {
     const auto count = static_cast<std::ptrdiff_t>(update.rows.size());
     std::vector<std::ptrdiff_t> to(update.rows.size());
     for (std::ptrdiff_t i = 0; i < count; ++i) to[i] = place(update.rows[i]);
     each(count, [&](std::ptrdiff_t j) {
-      const double* value = update.values.get() + j * count - j * (j - 1) / 2;
-      double* column = front + to[j] * size;
+      const Real* value = update.values.as<Real>() + j * count - j * (j - 1) / 2;
+      Real* column = front + to[j] * size;
       for (std::ptrdiff_t i = j; i < count; ++i) column[to[i]] += *value++;
     });
   }
 
-  Update left_over(const EliminationGroup& group, const double* front, std::ptrdiff_t size) {
+  Update left_over(const EliminationGroup& group, const Real* front, std::ptrdiff_t size) {
     const auto pivots = static_cast<std::ptrdiff_t>(group.positive + group.negative);
     const std::ptrdiff_t count = size - pivots;
     Update result;
     result.rows.assign(group.rows.begin() + pivots, group.rows.end());
-    result.values = pool_.take(static_cast<std::size_t>(packed(count)));
+    result.values = take(packed(count));
     each(count, [&](std::ptrdiff_t j) {
-      const double* column = front + (pivots + j) * size + pivots;
-      std::copy(column + j, column + count, result.values.get() + j * count - j * (j - 1) / 2);
+      const Real* column = front + (pivots + j) * size + pivots;
+      std::copy(column + j, column + count, result.values.as<Real>() + j * count - j * (j - 1) / 2);
     });
     return result;
   }
@@ -317,7 +326,8 @@ class Elimination {
 };
 
 /// Rows of a front that wait for a parent that compresses are members of the next group above that does.
-HierarchicalMatrix Elimination::compressed(Eigen::MatrixXd& whole_rows) {
+template <typename Real>
+HierarchicalMatrix Elimination<Real>::compressed(Eigen::MatrixXd& whole_rows) {
   std::vector<HierarchicalMatrix::Node> nodes;
   std::vector<Eigen::MatrixXd> whole;
   std::vector<int> node_of(groups_.size(), -1);
@@ -359,11 +369,12 @@ HierarchicalMatrix Elimination::compressed(Eigen::MatrixXd& whole_rows) {
   return result;
 }
 
+template <typename Real>
 std::optional<Eigen::MatrixXd> schur_of(const SymmetricEntries& matrix, int last, const EliminationTree& tree,
                                         FrontFactors* kept, FactorReport* report) {
   const auto start = std::chrono::steady_clock::now();
   if (openblas_get_num_threads() != 1) openblas_set_num_threads(1);
-  Elimination elimination(matrix, last, tree, {}, kept);
+  Elimination<Real> elimination(matrix, last, tree, {}, kept);
   const auto middle = std::chrono::steady_clock::now();
   Eigen::MatrixXd schur = Eigen::MatrixXd::Zero(last, last);
   if (!elimination.run(schur) || !schur.allFinite()) return std::nullopt;
@@ -381,7 +392,7 @@ std::optional<Eigen::MatrixXd> schur_of(const SymmetricEntries& matrix, int last
 
 std::optional<Eigen::MatrixXd> quasi_definite_schur(const SymmetricEntries& matrix, int last,
                                                     const EliminationTree& tree, FactorReport* report) {
-  return schur_of(matrix, last, tree, nullptr, report);
+  return schur_of<double>(matrix, last, tree, nullptr, report);
 }
 
 FrontalFactor::FrontalFactor() = default;
@@ -392,7 +403,7 @@ FrontalFactor::~FrontalFactor() = default;
 std::optional<FrontalFactor> FrontalFactor::make(const SymmetricEntries& matrix, int last,
                                                              const EliminationTree& tree, FactorReport* report) {
   auto fronts = std::make_unique<FrontFactors>();
-  std::optional<Eigen::MatrixXd> complement = schur_of(matrix, last, tree, fronts.get(), report);
+  std::optional<Eigen::MatrixXd> complement = schur_of<float>(matrix, last, tree, fronts.get(), report);
   if (!complement) return std::nullopt;
   FrontalFactor result;
   result.fronts_ = std::move(fronts);
@@ -400,7 +411,7 @@ std::optional<FrontalFactor> FrontalFactor::make(const SymmetricEntries& matrix,
   return result;
 }
 
-Eigen::VectorXd FrontalFactor::solve(const Eigen::VectorXd& right) const {
+Eigen::MatrixXd FrontalFactor::solve(const Eigen::MatrixXd& right) const {
   return fronts_->solve(right);
 }
 
@@ -408,7 +419,7 @@ std::optional<CompressedSchur> compressed_schur(const SymmetricEntries& matrix, 
                                                 const EliminationTree& tree, FactorReport* report) {
   const auto start = std::chrono::steady_clock::now();
   if (openblas_get_num_threads() != 1) openblas_set_num_threads(1);
-  Elimination elimination(matrix, last, tree, whole);
+  Elimination<double> elimination(matrix, last, tree, whole);
   const auto middle = std::chrono::steady_clock::now();
   CompressedSchur result;
   result.whole = Eigen::MatrixXd::Zero(whole, last);

@@ -35,8 +35,8 @@ class FrontalFactor {
 
   /// Of the last unknowns, symmetric.
   const Eigen::MatrixXd& complement() const { return complement_; }
-  /// The solution of the other unknowns' block. The same input gives the same bytes on any number of threads.
-  Eigen::VectorXd solve(const Eigen::VectorXd& right) const;
+  /// Solutions of the other unknowns' block, one a column. The same input gives the same bytes on any number of threads.
+  Eigen::MatrixXd solve(const Eigen::MatrixXd& right) const;
 
  private:
   FrontalFactor();

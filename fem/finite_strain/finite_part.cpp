@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -17,8 +18,9 @@ namespace touchstone::fem {
 namespace {
 
 constexpr int kMostNewton = 25;  // with a tangent of their own
+constexpr int kRowsAFactor = 60; // to add so many to a tangent takes about as long as a new one
 constexpr int kMostSteps = 100;  // with any
-constexpr double kSlow = 0.25;   // of the error before: a tangent that takes off less is made anew
+constexpr double kStepsAFactor = 15.0;  // a tangent that needs so many steps more is made anew: that takes as long
 constexpr int kPlainSteps = 2;    // before Aitken's rule
 constexpr int kTurningSteps = 4;  // after these the lines of contact stay
 constexpr int kMostBacktracks = 5;
@@ -216,10 +218,25 @@ double FinitePartSolver::error_of(const FiniteSnapshot& from, const PartTarget& 
   return error;
 }
 
-/// Whether the tangent there is can be used for these vertices and forces.
-bool FinitePartSolver::covers(const std::vector<int>& block, const std::vector<int>& forced) const {
-  return tangent_ && tangent_->forced == forced &&
-         std::includes(tangent_->block.begin(), tangent_->block.end(), block.begin(), block.end());
+/// Whether the tangent there is can be used for these vertices; it gets those that it lacks.
+bool FinitePartSolver::cover(const PartTarget& target, const Iterate& iterate, const std::vector<int>& block) {
+  if (!tangent_ || tangent_->forced != forced_axes(target)) return false;
+  std::vector<int> missing;
+  std::set_difference(block.begin(), block.end(), tangent_->block.begin(), tangent_->block.end(),
+                      std::back_inserter(missing));
+  if (missing.empty()) return true;
+  if (getenv("DBG")) fprintf(stderr, "   missing %zu\n", missing.size());
+  if (kRowsAFactor < tangent_->components * std::ssize(missing)) return false;
+  // With what will be next.
+  const std::size_t own = missing.size();
+  for (std::size_t k = 0; k < own; ++k) {
+    for (const int u : gel_.rest.around[missing[k]]) {
+      if (std::isfinite(iterate.at.gap.weighted[u])) missing.push_back(u);
+    }
+  }
+  tangent_ = std::make_shared<const FiniteTangent>(
+      with_vertices(*tangent_, gel_, iterate.at.gap, iterate.axes, missing));
+  return true;
 }
 
 /// Makes the tangent at the iterate, for its candidates and those beside them. False: why_not_ says why.
@@ -288,7 +305,7 @@ bool FinitePartSolver::find_step(const FiniteSnapshot& from, const PartTarget& t
   }
   push(traction);
   // Where gel and object would go with the tractions that there are, and from there without them.
-  const Eigen::VectorXd back = tangent_->factor.solve(right);
+  const Eigen::VectorXd back = tangent_->factor->solve(right);
   ContactLaws free{tangent_->compliance(rows, rows), opening};
   for (std::size_t r = 0; r < laws.rows.size(); ++r) {
     for (const auto& [i, x] : laws.rows[r]) free.ahead[static_cast<Eigen::Index>(r)] += length * x * back[i];
@@ -327,7 +344,7 @@ bool FinitePartSolver::find_step(const FiniteSnapshot& from, const PartTarget& t
   }
   right.setZero();
   push(step.answer.z - traction);
-  step.change = back + tangent_->factor.solve(right);
+  step.change = back + tangent_->factor->solve(right);
   return true;
 }
 
@@ -412,7 +429,7 @@ std::optional<FiniteSnapshot> FinitePartSolver::solve(const FiniteSnapshot& from
       return true;
     };
     // What fails with an old tangent is tried again with a new one.
-    bool anew = slow || !covers(step.block, forced_axes(target));
+    bool anew = slow || !cover(target, iterate, step.block);
     bool gone = go(anew);
     if (!gone && !anew) gone = go(anew = true);
     if (!gone) return std::nullopt;
@@ -439,7 +456,8 @@ std::optional<FiniteSnapshot> FinitePartSolver::solve(const FiniteSnapshot& from
       return std::move(found);
     }
     if (!std::isfinite(iterate.balance)) break;
-    slow = !anew && error > kSlow * last_error;
+    if (getenv("DBG")) fprintf(stderr, "  it %d anew %d slow %d error %.3g balance %.3g factor %.2f block %zu/%zu\n", iteration, anew, slow, error, iterate.balance, factor, step.block.size(), tangent_->block.size());
+    slow = !anew && std::log(error) > kStepsAFactor * std::log(last_error / error);
   }
   why_not_ = fmt::format("Newton's method is {:.2g} times its tolerance off after {} steps", error, kMostNewton);
   return std::nullopt;

@@ -72,7 +72,7 @@ class FinitePartSolver {
   Eigen::Vector2d slid(const FiniteSnapshot& from, const FiniteSnapshot& at, int vertex,
                        const Eigen::Matrix3d& axes) const;
   double error_of(const FiniteSnapshot& from, const PartTarget& target, const Iterate& iterate) const;
-  bool covers(const std::vector<int>& block, const std::vector<int>& forced) const;
+  bool cover(const PartTarget& target, const Iterate& iterate, const std::vector<int>& block);
   bool factorise(const PartTarget& target, const Iterate& iterate, PartEffort& effort);
   bool find_step(const FiniteSnapshot& from, const PartTarget& target, Iterate& iterate, Step& step,
                  PartEffort& effort);

@@ -1,6 +1,7 @@
 #include "fem/finite_strain/finite_tangent.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -48,7 +49,48 @@ FiniteTangent finite_tangent(const FiniteGel& gel, const FiniteSnapshot& at, con
       FrontalFactor::make(matrix, last, with_shifts(gel.tree, gel.space.unknowns, laws.inner));
   if (!factor) fail("the gel's tangent is singular");
   Eigen::MatrixXd compliance = factor->complement() * (-scales.length / force_scale(gel) / (border * border));
-  return {std::move(block), std::move(forced), components, std::move(compliance), std::move(*factor)};
+  return {std::move(block), std::move(forced), components, std::move(compliance),
+          std::make_shared<const FrontalFactor>(std::move(*factor))};
+}
+
+FiniteTangent with_vertices(const FiniteTangent& tangent, const FiniteGel& gel, const DeformedGap& gap,
+                            const std::vector<Eigen::Matrix3d>& axes, const std::vector<int>& more) {
+  const int c = tangent.components;
+  FiniteTangent wider{{}, tangent.forced, c, {}, tangent.factor};
+  std::vector<int> rows_before;  // of the block, and where they are in the wider one
+  std::vector<int> rows_kept;
+  for (std::size_t j = 0; j < tangent.block.size(); ++j) {
+    if (!std::isfinite(gap.weighted[tangent.block[j]])) continue;
+    wider.block.push_back(tangent.block[j]);
+    for (int t = 0; t < c; ++t) rows_before.push_back(c * static_cast<int>(j) + t);
+  }
+  wider.block.insert(wider.block.end(), more.begin(), more.end());
+  std::sort(wider.block.begin(), wider.block.end());
+  wider.block.erase(std::unique(wider.block.begin(), wider.block.end()), wider.block.end());
+  std::vector<int> rows_new;
+  for (std::size_t j = 0; j < wider.block.size(); ++j) {
+    const bool known = std::binary_search(tangent.block.begin(), tangent.block.end(), wider.block[j]);
+    for (int t = 0; t < c; ++t) (known ? rows_kept : rows_new).push_back(c * static_cast<int>(j) + t);
+  }
+  const LawRows laws = law_rows(gel, gap, axes, wider.block, c, tangent.forced);
+  Eigen::MatrixXd loads = Eigen::MatrixXd::Zero(laws.inner, std::ssize(rows_new));
+  for (std::size_t k = 0; k < rows_new.size(); ++k) {
+    for (const auto& [i, x] : laws.rows[static_cast<std::size_t>(rows_new[k])]) {
+      loads(i, static_cast<Eigen::Index>(k)) += x;
+    }
+  }
+  const Eigen::MatrixXd moved = tangent.factor->solve(loads) * (gel.problem.scales().length / force_scale(gel));
+  wider.compliance = Eigen::MatrixXd::Zero(std::ssize(laws.rows), std::ssize(laws.rows));
+  wider.compliance(rows_kept, rows_kept) = tangent.compliance(rows_before, rows_before);
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(std::ssize(laws.rows), std::ssize(rows_new));
+  for (std::size_t r = 0; r < laws.rows.size(); ++r) {
+    for (const auto& [i, x] : laws.rows[r]) columns.row(static_cast<Eigen::Index>(r)) += x * moved.row(i);
+  }
+  const Eigen::MatrixXd corner = columns(rows_new, Eigen::all);
+  columns(rows_new, Eigen::all) = 0.5 * (corner + corner.transpose());
+  wider.compliance(Eigen::all, rows_new) = columns;
+  wider.compliance(rows_new, Eigen::all) = columns.transpose();
+  return wider;
 }
 
 double hold_stiffness(const FiniteGel& gel, int vertex) {

@@ -2,6 +2,7 @@
 // The tangent of a finite-strain press, factorised: the gel's, the object's shifts and what contact adds.
 
 #include <Eigen/Core>
+#include <memory>
 #include <vector>
 
 #include "fem/elements/quasi_definite_schur.h"
@@ -15,12 +16,17 @@ struct FiniteTangent {
   std::vector<int> forced;     ///< axes whose forces are given, rising
   int components = 1;          ///< rows a vertex, as in LawRows
   Eigen::MatrixXd compliance;  ///< of the block's rows, mm^3 per MPa
-  FrontalFactor factor;        ///< of the gel's unknowns and the shifts, without units
+  std::shared_ptr<const FrontalFactor> factor;  ///< of the gel's unknowns and the shifts, without units
 };
 
 /// At the state `at`, with its gap. `axes` as for law_rows. @throws Error if the tangent is singular
 FiniteTangent finite_tangent(const FiniteGel& gel, const FiniteSnapshot& at, const std::vector<Eigen::Matrix3d>& axes,
                              std::vector<int> block, int components, std::vector<int> forced);
+
+/// The same with more vertices, by solutions with its factor: a sixtieth of a new one for each row. Vertices whose gap
+/// isn't finite are left out.
+FiniteTangent with_vertices(const FiniteTangent& tangent, const FiniteGel& gel, const DeformedGap& gap,
+                            const std::vector<Eigen::Matrix3d>& axes, const std::vector<int>& more);
 
 /// A contact problem's compliance and the gaps and slips that it begins with.
 struct ContactLaws {
