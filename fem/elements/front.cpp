@@ -114,7 +114,8 @@ class Front {
       const int rows = std::min(kTile, size_ - row);
       const int columns = std::min(kTile, last - column);
       if (row_tile == column_tile) {
-        Blas<Real>::syrk("L", "N", &columns, &inner, &scale, at(column, from), &size_, &keep, at(column, column), &size_, 1, 1);
+        Blas<Real>::syrk("L", "N", &columns, &inner, &scale, at(column, from), &size_, &keep, at(column, column),
+                         &size_, 1, 1);
         const int below = rows - columns;  // where the columns end before the tile does
         if (below > 0) multiply(column + columns, column, below, columns, from, inner, scale);
         return;
@@ -129,7 +130,7 @@ class Front {
   void multiply(int row, int column, int rows, int columns, int from, int inner, Real scale) {
     const Real keep = 1;
     Blas<Real>::gemm("N", "T", &rows, &columns, &inner, &scale, at(row, from), &size_, at(column, from), &size_, &keep,
-           at(row, column), &size_, 1, 1);
+                     at(row, column), &size_, 1, 1);
   }
 
   Real* data_;
@@ -190,8 +191,8 @@ bool eliminate_indefinite_front(float* data, int size, int pivots) {
   each(tiles, [&](int tile) {
     const int row = tile * kTile;
     const int count = std::min(kTile, later - row);
-    sgemm_("N", "N", &count, &pivots, &pivots, &one, rows.data() + row, &later, data, &size, &none,
-           at(pivots + row, 0), &size, 1, 1);
+    sgemm_("N", "N", &count, &pivots, &pivots, &one, rows.data() + row, &later, data, &size, &none, at(pivots + row, 0),
+           &size, 1, 1);
   });
   each(tiles * tiles, [&](int tile) {
     const int row = tile / tiles * kTile;

@@ -14,9 +14,9 @@ bool eliminate_front(double* front, int size, int positive, int negative);
 /// In single precision.
 bool eliminate_front(float* front, int size, int positive, int negative);
 
-/// The same in single precision by Gauss's elimination of the pivots' block with partial pivoting in it, whatever its signs: three times the
-/// work. The columns before are left as the block's inverse (whole) and, below it, the rows times that. False if the
-/// block is singular. @pre OpenBLAS is set to one thread
+/// The same in single precision by Gauss's elimination of the pivots' block with partial pivoting in it, whatever its
+/// signs: three times the work. The columns before are left as the block's inverse (whole) and, below it, the rows
+/// times that. False if the block is singular. @pre OpenBLAS is set to one thread
 bool eliminate_indefinite_front(float* front, int size, int pivots);
 
 }  // namespace touchstone::fem

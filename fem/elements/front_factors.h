@@ -15,8 +15,8 @@ class FrontFactors {
  public:
   /// For these groups; the first `free` places are eliminated.
   void set_up(const EliminationGroups& plan, int free);
-  /// Takes a group's front as eliminate_front() leaves it, or eliminate_indefinite_front(). Different groups may be kept
-  /// at once by several threads.
+  /// Takes a group's front as eliminate_front() leaves it, or eliminate_indefinite_front(). Different groups may be
+  /// kept at once by several threads.
   void keep(int group, const float* front, bool indefinite);
   /// The solutions of what was eliminated, one a column, by branches of the tree that threads share. @pre all groups
   /// are kept

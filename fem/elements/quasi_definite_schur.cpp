@@ -400,8 +400,8 @@ FrontalFactor::FrontalFactor(FrontalFactor&&) noexcept = default;
 FrontalFactor& FrontalFactor::operator=(FrontalFactor&&) noexcept = default;
 FrontalFactor::~FrontalFactor() = default;
 
-std::optional<FrontalFactor> FrontalFactor::make(const SymmetricEntries& matrix, int last,
-                                                             const EliminationTree& tree, FactorReport* report) {
+std::optional<FrontalFactor> FrontalFactor::make(const SymmetricEntries& matrix, int last, const EliminationTree& tree,
+                                                 FactorReport* report) {
   auto fronts = std::make_unique<FrontFactors>();
   std::optional<Eigen::MatrixXd> complement = schur_of<float>(matrix, last, tree, fronts.get(), report);
   if (!complement) return std::nullopt;

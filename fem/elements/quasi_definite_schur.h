@@ -35,7 +35,8 @@ class FrontalFactor {
 
   /// Of the last unknowns, symmetric.
   const Eigen::MatrixXd& complement() const { return complement_; }
-  /// Solutions of the other unknowns' block, one a column. The same input gives the same bytes on any number of threads.
+  /// Solutions of the other unknowns' block, one a column. The same input gives the same bytes on any number of
+  /// threads.
   Eigen::MatrixXd solve(const Eigen::MatrixXd& right) const;
 
  private:

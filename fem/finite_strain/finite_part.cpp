@@ -17,12 +17,13 @@
 namespace touchstone::fem {
 namespace {
 
-constexpr int kMostNewton = 25;  // with a tangent of their own
-constexpr int kRowsAFactor = 60; // to add so many to a tangent takes about as long as a new one
-constexpr int kMostSteps = 100;  // with any
+constexpr int kMostNewton = 25;         // with a tangent of their own
+constexpr int kRowsAFactor = 60;        // to add so many to a tangent takes about as long as a new one
+constexpr int kMostSteps = 100;         // with any
 constexpr double kStepsAFactor = 15.0;  // a tangent that needs so many steps more is made anew: that takes as long
-constexpr int kPlainSteps = 2;    // before Aitken's rule
-constexpr int kTurningSteps = 4;  // after these the lines of contact stay
+constexpr int kPlainSteps = 2;          // before Aitken's rule
+constexpr int kTurningSteps = 10;       // after these the lines of contact stay,
+constexpr double kNearlyRight = 100.0;  // and from this error on, of what is allowed
 constexpr int kMostBacktracks = 5;
 constexpr double kLeastShrink = 0.2;  // of the least J in one Newton step
 constexpr double kLeastRatio = 0.1;   // J: below, elements deform as the gel can't
@@ -225,7 +226,6 @@ bool FinitePartSolver::cover(const PartTarget& target, const Iterate& iterate, c
   std::set_difference(block.begin(), block.end(), tangent_->block.begin(), tangent_->block.end(),
                       std::back_inserter(missing));
   if (missing.empty()) return true;
-  if (getenv("DBG")) fprintf(stderr, "   missing %zu\n", missing.size());
   if (kRowsAFactor < tangent_->components * std::ssize(missing)) return false;
   // With what will be next.
   const std::size_t own = missing.size();
@@ -234,8 +234,8 @@ bool FinitePartSolver::cover(const PartTarget& target, const Iterate& iterate, c
       if (std::isfinite(iterate.at.gap.weighted[u])) missing.push_back(u);
     }
   }
-  tangent_ = std::make_shared<const FiniteTangent>(
-      with_vertices(*tangent_, gel_, iterate.at.gap, iterate.axes, missing));
+  tangent_ =
+      std::make_shared<const FiniteTangent>(with_vertices(*tangent_, gel_, iterate.at.gap, iterate.axes, missing));
   return true;
 }
 
@@ -252,8 +252,8 @@ bool FinitePartSolver::factorise(const PartTarget& target, const Iterate& iterat
   std::sort(block.begin(), block.end());
   block.erase(std::unique(block.begin(), block.end()), block.end());
   try {
-    tangent_ = std::make_shared<const FiniteTangent>(finite_tangent(
-        gel_, iterate.at, iterate.axes, std::move(block), friction_ > 0.0 ? 3 : 1, forced_axes(target)));
+    tangent_ = std::make_shared<const FiniteTangent>(
+        finite_tangent(gel_, iterate.at, iterate.axes, std::move(block), friction_ > 0.0 ? 3 : 1, forced_axes(target)));
   } catch (const Error& singular) {
     why_not_ = singular.what();
     return false;
@@ -311,11 +311,11 @@ bool FinitePartSolver::find_step(const FiniteSnapshot& from, const PartTarget& t
     for (const auto& [i, x] : laws.rows[r]) free.ahead[static_cast<Eigen::Index>(r)] += length * x * back[i];
   }
   free.ahead -= free.compliance * traction;
-  ContactLaws stiff = held_stiffly(
+  const ContactLaws stiff = held_stiffly(
       free, held, Eigen::Map<const Eigen::VectorXd>(stiffness.data(), static_cast<Eigen::Index>(stiffness.size())));
   const Eigen::VectorXd& ahead = stiff.ahead;
   ContactProblem contact;
-  contact.compliance.emplace(std::move(stiff.compliance));
+  contact.compliance.emplace(stiff.compliance);
   contact.components = c;
   contact.friction = Eigen::VectorXd::Constant(m, friction_);
   contact.gap.resize(m);
@@ -327,9 +327,8 @@ bool FinitePartSolver::find_step(const FiniteSnapshot& from, const PartTarget& t
     if (c == 1) continue;
     const int v = step.block[static_cast<std::size_t>(j)];
     contact.drag.segment<2>(2 * j) = -ahead.segment<2>(c * j + 1);
-    const Eigen::Index first = c * j + 1;
-    iterate.tangential_scale[v] =
-        std::max(free.compliance(first, first), free.compliance(first + 1, first + 1));
+    const auto scale = [&](Eigen::Index row) { return stiff.compliance(row, row); };
+    iterate.tangential_scale[v] = std::max(scale(c * j + 1), scale(c * j + 2));
   }
   const Eigen::VectorXd start = at.touching ? traction : Eigen::VectorXd();
   ContactMemory memory;
@@ -437,7 +436,7 @@ std::optional<FiniteSnapshot> FinitePartSolver::solve(const FiniteSnapshot& from
     last_change = step.change;
     // How the lines turn, and which of them hit, isn't in the tangent. It hardly matters but at an edge as narrow as
     // the mesh, where Newton's steps may alternate; so the lines stay once they are nearly right.
-    evaluate(iteration < kTurningSteps ? nullptr : &iterate.lines, iterate, effort);
+    evaluate(iteration < kTurningSteps && error > kNearlyRight ? nullptr : &iterate.lines, iterate, effort);
     const double last_error = error;
     error = error_of(from, target, iterate);
     if (error <= 1.0) {
@@ -456,7 +455,6 @@ std::optional<FiniteSnapshot> FinitePartSolver::solve(const FiniteSnapshot& from
       return std::move(found);
     }
     if (!std::isfinite(iterate.balance)) break;
-    if (getenv("DBG")) fprintf(stderr, "  it %d anew %d slow %d error %.3g balance %.3g factor %.2f block %zu/%zu\n", iteration, anew, slow, error, iterate.balance, factor, step.block.size(), tangent_->block.size());
     slow = !anew && std::log(error) > kStepsAFactor * std::log(last_error / error);
   }
   why_not_ = fmt::format("Newton's method is {:.2g} times its tolerance off after {} steps", error, kMostNewton);

@@ -12,10 +12,10 @@ namespace touchstone::fem {
 
 /// Factorised at one state, for the vertices of a block.
 struct FiniteTangent {
-  std::vector<int> block;      ///< vertices that may touch, rising
-  std::vector<int> forced;     ///< axes whose forces are given, rising
-  int components = 1;          ///< rows a vertex, as in LawRows
-  Eigen::MatrixXd compliance;  ///< of the block's rows, mm^3 per MPa
+  std::vector<int> block;                       ///< vertices that may touch, rising
+  std::vector<int> forced;                      ///< axes whose forces are given, rising
+  int components = 1;                           ///< rows a vertex, as in LawRows
+  Eigen::MatrixXd compliance;                   ///< of the block's rows, mm^3 per MPa
   std::shared_ptr<const FrontalFactor> factor;  ///< of the gel's unknowns and the shifts, without units
 };
 
@@ -35,9 +35,9 @@ struct ContactLaws {
 };
 
 /// A gel under pressure is stable in the hold of its contact, not under the same pressure as dead load (from a pressure
-/// of some 2 G on). What is held, the rows `held`, is therefore made stiff by `stiffness` (each row's, MPa per mm^3), by
-/// terms that vanish where it holds (the augmented Lagrangian of [Hestenes1969] and [Powell1969]), so that the compliance
-/// is positive definite. The tractions that answer the laws are the same.
+/// of some 2 G on). What is held, the rows `held`, is therefore made stiff by `stiffness` (each row's, MPa per mm^3),
+/// by terms that vanish where it holds (the augmented Lagrangian of [Hestenes1969] and [Powell1969]), so that the
+/// compliance is positive definite. The tractions that answer the laws are the same.
 ContactLaws held_stiffly(const ContactLaws& laws, const std::vector<int>& held, const Eigen::VectorXd& stiffness);
 
 /// The stiffness of a vertex's hold, MPa per mm^3.
