@@ -392,6 +392,23 @@ bool FinitePartSolver::take_step(const PartTarget& target, const Step& step, dou
   return true;
 }
 
+/// What a converged iterate has found. Nothing: why_not_ says why.
+std::optional<FiniteSnapshot> FinitePartSolver::finished(Iterate iterate) {
+  if (iterate.least < kLeastRatio) {
+    why_not_ = fmt::format("a tetrahedron keeps but {:.2g} of its volume: the mesh is too coarse where it's strained",
+                           iterate.least);
+    return std::nullopt;
+  }
+  FiniteSnapshot& found = iterate.at;
+  if (!found.touching) return untouched(gel_, found.pose);
+  found.penetration = 0.0;
+  for (int v = 0; v < n_; ++v) {
+    if (!std::isfinite(found.gap.weighted[v])) continue;
+    found.penetration = std::max(found.penetration, -found.gap.weighted[v] / gel_.rest.weight[v]);
+  }
+  return std::move(found);
+}
+
 std::optional<FiniteSnapshot> FinitePartSolver::solve(const FiniteSnapshot& from, const PartTarget& target,
                                                       PartEffort& effort) {
   Iterate iterate;
@@ -427,35 +444,28 @@ std::optional<FiniteSnapshot> FinitePartSolver::solve(const FiniteSnapshot& from
       factor = next_factor;
       return true;
     };
-    // What fails with an old tangent is tried again with a new one.
+    // What fails with an old tangent, or leads away, is tried again with a new one.
     bool anew = slow || !cover(target, iterate, step.block);
+    std::optional<Iterate> before;
+    if (!anew) before = iterate;
     bool gone = go(anew);
     if (!gone && !anew) gone = go(anew = true);
     if (!gone) return std::nullopt;
     made += anew;
-    last_change = step.change;
     // How the lines turn, and which of them hit, isn't in the tangent. It hardly matters but at an edge as narrow as
     // the mesh, where Newton's steps may alternate; so the lines stay once they are nearly right.
     evaluate(iteration < kTurningSteps && error > kNearlyRight ? nullptr : &iterate.lines, iterate, effort);
     const double last_error = error;
     error = error_of(from, target, iterate);
-    if (error <= 1.0) {
-      if (iterate.least < kLeastRatio) {
-        why_not_ = fmt::format(
-            "a tetrahedron keeps but {:.2g} of its volume: the mesh is too coarse where it's strained", iterate.least);
-        return std::nullopt;
-      }
-      FiniteSnapshot& found = iterate.at;
-      if (!found.touching) return untouched(gel_, found.pose);
-      found.penetration = 0.0;
-      for (int v = 0; v < n_; ++v) {
-        if (!std::isfinite(found.gap.weighted[v])) continue;
-        found.penetration = std::max(found.penetration, -found.gap.weighted[v] / gel_.rest.weight[v]);
-      }
-      return std::move(found);
+    slow = !anew && !(std::log(error) < kStepsAFactor * std::log(last_error / error));
+    if (!anew && iteration > 1 && !(error < last_error)) {
+      iterate = std::move(*before);
+      error = last_error;
+      continue;
     }
+    last_change = step.change;
+    if (error <= 1.0) return finished(std::move(iterate));
     if (!std::isfinite(iterate.balance)) break;
-    slow = !anew && std::log(error) > kStepsAFactor * std::log(last_error / error);
   }
   why_not_ = fmt::format("Newton's method is {:.2g} times its tolerance off after {} steps", error, kMostNewton);
   return std::nullopt;

@@ -76,6 +76,7 @@ class FinitePartSolver {
   bool factorise(const PartTarget& target, const Iterate& iterate, PartEffort& effort);
   bool find_step(const FiniteSnapshot& from, const PartTarget& target, Iterate& iterate, Step& step,
                  PartEffort& effort);
+  std::optional<FiniteSnapshot> finished(Iterate iterate);
   bool take_step(const PartTarget& target, const Step& step, double& factor, Iterate& iterate);
 
   const FiniteGel& gel_;

@@ -1,13 +1,14 @@
 #pragma once
 // A rigid body pressed on a neo-Hookean gel at finite strain, step by step along a motion: what fem/contact/press.h
-// does in linear elasticity, slower (a factorisation of the whole gel each Newton iteration) and without its limits.
+// does in linear elasticity, slower (a factorisation of the whole gel every part or every few) and without its limits.
 //
-// Each Newton iterate factorises the tangent bordered by the rows of the vertices that may touch. The Schur complement
-// is the surface compliance at that state, so contact with Coulomb friction is solved on it as in the linear case, and
-// the volume follows by two solutions with the same factorisation. Gaps and the direction of contact forces belong to
-// the deformed surface (fem/finite_strain/finite_contact.h). Tractions are nominal: force per undeformed area. Friction
-// acts in the plane across the vertex's mean contact direction, against the motion relative to the object since the
-// last step.
+// The tangent is factorised bordered by the rows of the vertices that may touch (fem/finite_strain/finite_tangent.h).
+// The Schur complement is the surface compliance at that state, so contact with Coulomb friction is solved on it as in
+// the linear case, and the volume follows by two solutions with the same factor. It serves for further iterates and
+// parts, with residual and gaps as they are there, as long as the error falls fast enough. Gaps and the direction of
+// contact forces belong to the deformed surface (fem/finite_strain/finite_contact.h). Tractions are nominal: force per
+// undeformed area. Friction acts in the plane across the vertex's mean contact direction, against the motion relative
+// to the object since the last step.
 //
 // A gel may relax (fem/contact/relaxation.h): all of its nominal stress, the pressure in it, is then the hereditary
 // integral of what the elastic gel has at the same displacements (quasi-linear [Fung1972], with the same function for

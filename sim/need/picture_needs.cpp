@@ -132,7 +132,7 @@ void add_picture_needs(const SceneSpec& scene, const Plan& plan, const fem::Comp
         sum.add(planned[k], pictures_of(turned, camera, press, masks[k], settings.paths, responses), masks[k],
                 responses);
       }
-      need.change = Change{.pixel_noise = sum.root()};
+      need.change.emplace().pixel_noise = sum.root();
       const SceneView& fine = plan.fine_relief ? view : turned;
       if (one.planned == &Plan::fine_relief && (scene.device.coating || scene.outputs.height)) {
         double most = 0.0;

@@ -7,10 +7,17 @@
 #include "sim/plan/change_units.h"
 
 namespace touchstone::sim {
+
 bool exceeds(const Change& change, const Accuracy& allowed) {
   return std::any_of(kChangeUnits.begin(), kChangeUnits.end(), [&](const ChangeUnit& unit) {
     return change.*unit.changed && *(change.*unit.changed) > allowed.*unit.allowed;
   });
+}
+
+Accuracy parts_of(const Accuracy& accuracy, double part) {
+  Accuracy parts;
+  for (const ChangeUnit& unit : kChangeUnits) parts.*unit.allowed = part * (accuracy.*unit.allowed);
+  return parts;
 }
 
 std::string in_words(const Change& change, const Accuracy& allowed) {

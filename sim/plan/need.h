@@ -23,6 +23,9 @@ struct Change {
 /// Whether it is more than may be left out, in any unit.
 bool exceeds(const Change& change, const Accuracy& allowed);
 
+/// So much of it in each unit.
+Accuracy parts_of(const Accuracy& accuracy, double part);
+
 /// As "a force by 3.2 % (allowed 1), pixels by 5.3 of their noise (allowed 1)"; "nothing" if it changes nothing.
 std::string in_words(const Change& change, const Accuracy& allowed);
 

@@ -112,7 +112,7 @@ void plan_finite_strain(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   }
   const std::string name = "finite strain";
   const std::string cost =
-      "some five factorisations of the whole gel for every tenth of its thickness: seconds to minutes a frame";
+      "a factorisation of the whole gel for every fiftieth of its thickness: one to some ten seconds a frame";
   if (asked == Elasticity::neo_hookean) {
     plan.finite_strain = table.add(name, true, "the scene asks for neo-Hookean elasticity", cost);
     return;

@@ -48,6 +48,18 @@ SymmetricEntries entries_of(const Eigen::MatrixXd& matrix) {
   return entries;
 }
 
+/// Two trees of 30 unknowns, one of them with a group that has none of its own.
+std::vector<EliminationTree> trees_of_thirty() {
+  EliminationTree chain;
+  for (int k = 0; k < 30; ++k) chain.order.push_back((7 * k) % 30);
+  chain.end = {1, 12, 12, 30};
+  chain.parent = {1, 2, 3, -1};
+  EliminationTree whole = chain;
+  whole.end = {30};
+  whole.parent = {-1};
+  return {chain, whole};
+}
+
 /// A gel's system with a border of its outer surface's vertical displacements.
 struct Gel {
   TetMesh mesh;
@@ -93,14 +105,7 @@ TEST(Front, WrongSignIsNoticed) {
 TEST(QuasiDefiniteSchur, IsWhatDenseAlgebraSaysForAnyTree) {
   const Eigen::MatrixXd matrix = dense(20, 10, 7);
   const Eigen::MatrixXd expected = schur_of(matrix, 7);
-  EliminationTree chain;
-  for (int k = 0; k < 30; ++k) chain.order.push_back((7 * k) % 30);
-  chain.end = {1, 12, 12, 30};  // one group has no unknown of its own
-  chain.parent = {1, 2, 3, -1};
-  EliminationTree whole = chain;
-  whole.end = {30};
-  whole.parent = {-1};
-  for (const EliminationTree& tree : {chain, whole}) {
+  for (const EliminationTree& tree : trees_of_thirty()) {
     FactorReport report;
     const auto found = quasi_definite_schur(entries_of(matrix), 7, tree, &report);
     ASSERT_TRUE(found);
@@ -154,6 +159,68 @@ TEST(QuasiDefiniteSchur, SingularOnesHaveNoAnswer) {
     if (gel.matrix.rows[k] == loose || gel.matrix.columns[k] == loose) gel.matrix.values[k] = 0.0;
   }
   EXPECT_FALSE(quasi_definite_schur(gel.matrix, gel.last, elimination_tree(gel.space)));
+}
+
+void expect_factorises(const Eigen::MatrixXd& matrix, const EliminationTree& tree) {
+  const auto factor = FrontalFactor::make(entries_of(matrix), 7, tree);
+  ASSERT_TRUE(factor);
+  const Eigen::MatrixXd expected = schur_of(matrix, 7);
+  EXPECT_LT((factor->complement() - expected).cwiseAbs().maxCoeff(), 1e-5 * expected.cwiseAbs().maxCoeff());
+  const Eigen::MatrixXd right = matrix.topRightCorner(30, 4) * 1e12;
+  const Eigen::MatrixXd solution = matrix.topLeftCorner(30, 30).partialPivLu().solve(right);
+  EXPECT_LT((factor->solve(right) - solution).norm(), 1e-5 * solution.norm());
+  EXPECT_LT((factor->solve(right.col(1)) - solution.col(1)).norm(), 1e-5 * solution.col(1).norm());
+  EXPECT_EQ(factor->solve(Eigen::MatrixXd::Zero(30, 1)).norm(), 0.0);
+}
+
+TEST(FrontalFactor, SolvesAsDenseAlgebraForAnyTree) {
+  for (const EliminationTree& tree : trees_of_thirty()) expect_factorises(dense(20, 10, 7), tree);
+}
+
+TEST(FrontalFactor, PivotsWhereASignIsWrong) {
+  Eigen::MatrixXd matrix = dense(20, 10, 7);
+  // Indefinite together, though each diagonal entry is positive.
+  matrix(3, 10) = matrix(10, 3) = 200.0;
+  matrix(17, 24) = matrix(24, 17) = -300.0;
+  for (const EliminationTree& tree : trees_of_thirty()) {
+    EXPECT_FALSE(quasi_definite_schur(entries_of(matrix), 7, tree));
+    expect_factorises(matrix, tree);
+  }
+}
+
+TEST(FrontalFactor, SolvesAGelsSystemToSinglePrecisionOnAnyNumberOfThreads) {
+  const Gel gel(0.49, 12);
+  const EliminationTree tree = elimination_tree(gel.space);
+  SymmetricEntries inner;
+  inner.size = gel.space.unknowns;
+  for (std::size_t k = 0; k < gel.matrix.rows.size(); ++k) {
+    if (std::max(gel.matrix.rows[k], gel.matrix.columns[k]) >= inner.size) continue;
+    inner.add(gel.matrix.rows[k], gel.matrix.columns[k], gel.matrix.values[k]);
+  }
+  Eigen::VectorXd right(inner.size);
+  for (Eigen::Index k = 0; k < right.size(); ++k) right[k] = std::sin(0.37 * static_cast<double>(k));
+  const Eigen::VectorXd expected = solve_symmetric(inner, tree.order, right);
+  std::optional<Eigen::MatrixXd> complement, solution;
+  for (const int threads : {4, 1, 2}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    const auto factor = FrontalFactor::make(gel.matrix, gel.last, tree);
+    ASSERT_TRUE(factor);
+    const Eigen::MatrixXd found = factor->solve(right);
+    EXPECT_LT((found - expected).norm(), 1e-4 * expected.norm());
+    if (!complement) complement = factor->complement();
+    if (!solution) solution = found;
+    EXPECT_TRUE(factor->complement() == *complement) << threads;
+    EXPECT_TRUE(found == *solution) << threads;
+  }
+}
+
+TEST(FrontalFactor, SingularOnesHaveNoAnswer) {
+  Eigen::MatrixXd matrix = dense(20, 10, 7);
+  matrix.row(4).setZero();
+  matrix.col(4).setZero();
+  for (const EliminationTree& tree : trees_of_thirty()) {
+    EXPECT_FALSE(FrontalFactor::make(entries_of(matrix), 7, tree));
+  }
 }
 
 }  // namespace

@@ -15,6 +15,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 SceneSpec shipped(const std::string& name) {
   return read_scene(std::filesystem::path(TOUCHSTONE_SOURCE_DIR) / "scenes/vhs" / name);
@@ -73,6 +74,16 @@ TEST(Need, MeasuredChangesDecideWhereAnAccuracyIsStated) {
   EXPECT_FALSE(off.finite_strain);
   const Plan unstated = make_plan(shipped("ball-press.yaml"), much);
   EXPECT_FALSE(unstated.finite_strain) << "nobody has said how exact it has to be";
+}
+
+TEST(Need, WhatIsMeasuredNearTheAllowedIsTaken) {
+  const SceneSpec scene = wanted("ball-press.yaml");
+  const Plan near = make_plan(scene, {{"interreflection", Change{.pixel_noise = 0.8}, ""}});
+  EXPECT_TRUE(near.interreflection);
+  EXPECT_THAT(effect(near, "interreflection").why, HasSubstr("so near to that it is taken"));
+  const Plan clear = make_plan(scene, {{"interreflection", Change{.pixel_noise = 1.1}, ""}});
+  EXPECT_THAT(effect(clear, "interreflection").why, Not(HasSubstr("so near")));
+  EXPECT_FALSE(make_plan(scene, {{"interreflection", Change{.pixel_noise = 0.7}, ""}}).interreflection);
 }
 
 TEST(Need, SwitchesCountMoreAndThePlanSaysWhatTheyLeaveOut) {
