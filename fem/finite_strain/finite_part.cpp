@@ -108,6 +108,15 @@ struct FinitePartSolver::Step {
   Eigen::VectorXd change;
 };
 
+/// A block's laws as they are at an iterate, c rows a vertex.
+struct FinitePartSolver::Now {
+  Eigen::VectorXd opening;    ///< gaps and slips, mm^3
+  Eigen::VectorXd traction;   ///< MPa
+  std::vector<int> rows;      ///< where each is in the tangent's compliance
+  std::vector<int> held;      ///< rows of what touches
+  Eigen::VectorXd stiffness;  ///< of the hold of each of these
+};
+
 FinitePartSolver::FinitePartSolver(const FiniteGel& gel, ContactShape shape, double friction, PressTolerance tolerance)
     : gel_(gel),
       shape_(std::move(shape)),
@@ -262,6 +271,33 @@ bool FinitePartSolver::factorise(const PartTarget& target, const Iterate& iterat
   return true;
 }
 
+/// @pre the tangent covers the block
+FinitePartSolver::Now FinitePartSolver::now_at(const FiniteSnapshot& from, const Iterate& iterate,
+                                               const std::vector<int>& block) const {
+  const FiniteSnapshot& at = iterate.at;
+  const int c = tangent_->components;
+  const auto m = static_cast<Eigen::Index>(block.size());
+  Now now{Eigen::VectorXd(c * m), Eigen::VectorXd(c * m), {}, {}, Eigen::VectorXd(c * m)};
+  for (Eigen::Index j = 0; j < m; ++j) {
+    const int v = block[static_cast<std::size_t>(j)];
+    const auto place = std::lower_bound(tangent_->block.begin(), tangent_->block.end(), v) - tangent_->block.begin();
+    now.opening[c * j] = at.gap.weighted[v];
+    now.traction[c * j] = at.pressure[v];
+    if (c == 3) {
+      now.opening.segment<2>(c * j + 1) = slid(from, at, v, iterate.axes[v]);
+      now.traction.segment<2>(c * j + 1) = iterate.axes[v].rightCols<2>().transpose() * at.shear.row(v).transpose();
+    }
+    for (int t = 0; t < c; ++t) {
+      now.rows.push_back(static_cast<int>(c * place + t));
+      if (at.state[v] == NodeState::open || (at.state[v] == NodeState::slip && t > 0)) continue;
+      now.stiffness[std::ssize(now.held)] = hold_stiffness(gel_, v);
+      now.held.push_back(static_cast<int>(c * j + t));
+    }
+  }
+  now.stiffness.conservativeResize(std::ssize(now.held));
+  return now;
+}
+
 /// The contact problem on the tangent's compliance. False: why_not_ says why. @pre the tangent covers the block
 bool FinitePartSolver::find_step(const FiniteSnapshot& from, const PartTarget& target, Iterate& iterate, Step& step,
                                  PartEffort& effort) {
@@ -272,27 +308,7 @@ bool FinitePartSolver::find_step(const FiniteSnapshot& from, const PartTarget& t
   const int c = tangent_->components;
   const auto m = static_cast<Eigen::Index>(step.block.size());
   const LawRows laws = law_rows(gel_, at.gap, iterate.axes, step.block, c, forced);
-  Eigen::VectorXd opening(c * m);   // gaps and slips, at this iterate
-  Eigen::VectorXd traction(c * m);  // likewise
-  std::vector<int> rows;            // of the tangent's block
-  std::vector<int> held;
-  std::vector<double> stiffness;
-  for (Eigen::Index j = 0; j < m; ++j) {
-    const int v = step.block[static_cast<std::size_t>(j)];
-    const auto place = std::lower_bound(tangent_->block.begin(), tangent_->block.end(), v) - tangent_->block.begin();
-    opening[c * j] = at.gap.weighted[v];
-    traction[c * j] = at.pressure[v];
-    if (c == 3) {
-      opening.segment<2>(c * j + 1) = slid(from, at, v, iterate.axes[v]);
-      traction.segment<2>(c * j + 1) = iterate.axes[v].rightCols<2>().transpose() * at.shear.row(v).transpose();
-    }
-    for (int t = 0; t < c; ++t) {
-      rows.push_back(static_cast<int>(c * place + t));
-      if (at.state[v] == NodeState::open || (at.state[v] == NodeState::slip && t > 0)) continue;
-      held.push_back(static_cast<int>(c * j + t));
-      stiffness.push_back(hold_stiffness(gel_, v));
-    }
-  }
+  const Now now = now_at(from, iterate, step.block);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(laws.inner);
   const auto push = [&](const Eigen::VectorXd& by) {
     for (std::size_t r = 0; r < laws.rows.size(); ++r) {
@@ -303,16 +319,15 @@ bool FinitePartSolver::find_step(const FiniteSnapshot& from, const PartTarget& t
   for (std::size_t b = 0; b < forced.size(); ++b) {
     right[gel_.space.unknowns + static_cast<int>(b)] = -(target.force[forced[b]] + iterate.bulges[forced[b]]) / unit;
   }
-  push(traction);
+  push(now.traction);
   // Where gel and object would go with the tractions that there are, and from there without them.
   const Eigen::VectorXd back = tangent_->factor->solve(right);
-  ContactLaws free{tangent_->compliance(rows, rows), opening};
+  ContactLaws free{tangent_->compliance(now.rows, now.rows), now.opening};
   for (std::size_t r = 0; r < laws.rows.size(); ++r) {
     for (const auto& [i, x] : laws.rows[r]) free.ahead[static_cast<Eigen::Index>(r)] += length * x * back[i];
   }
-  free.ahead -= free.compliance * traction;
-  const ContactLaws stiff = held_stiffly(
-      free, held, Eigen::Map<const Eigen::VectorXd>(stiffness.data(), static_cast<Eigen::Index>(stiffness.size())));
+  free.ahead -= free.compliance * now.traction;
+  const ContactLaws stiff = held_stiffly(free, now.held, now.stiffness);
   const Eigen::VectorXd& ahead = stiff.ahead;
   ContactProblem contact;
   contact.compliance.emplace(stiff.compliance);
@@ -330,7 +345,7 @@ bool FinitePartSolver::find_step(const FiniteSnapshot& from, const PartTarget& t
     const auto scale = [&](Eigen::Index row) { return stiff.compliance(row, row); };
     iterate.tangential_scale[v] = std::max(scale(c * j + 1), scale(c * j + 2));
   }
-  const Eigen::VectorXd start = at.touching ? traction : Eigen::VectorXd();
+  const Eigen::VectorXd start = at.touching ? now.traction : Eigen::VectorXd();
   ContactMemory memory;
   step.answer = c == 1 ? solve_frictionless(contact, start, memory)
                        : solve_frictional(contact, start, std::max(tolerance_.traction, 1e-10), memory);
@@ -342,7 +357,7 @@ bool FinitePartSolver::find_step(const FiniteSnapshot& from, const PartTarget& t
     return false;
   }
   right.setZero();
-  push(step.answer.z - traction);
+  push(step.answer.z - now.traction);
   step.change = back + tangent_->factor->solve(right);
   return true;
 }
@@ -446,6 +461,7 @@ std::optional<FiniteSnapshot> FinitePartSolver::solve(const FiniteSnapshot& from
     };
     // What fails with an old tangent, or leads away, is tried again with a new one.
     bool anew = slow || !cover(target, iterate, step.block);
+    const double last_factor = factor;
     std::optional<Iterate> before;
     if (!anew) before = iterate;
     bool gone = go(anew);
@@ -461,13 +477,14 @@ std::optional<FiniteSnapshot> FinitePartSolver::solve(const FiniteSnapshot& from
     if (!anew && iteration > 1 && !(error < last_error)) {
       iterate = std::move(*before);
       error = last_error;
+      factor = last_factor;
       continue;
     }
     last_change = step.change;
     if (error <= 1.0) return finished(std::move(iterate));
     if (!std::isfinite(iterate.balance)) break;
   }
-  why_not_ = fmt::format("Newton's method is {:.2g} times its tolerance off after {} steps", error, kMostNewton);
+  why_not_ = fmt::format("Newton's method is {:.2g} times its tolerance off with {} tangents", error, made);
   return std::nullopt;
 }
 

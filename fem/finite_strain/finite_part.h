@@ -67,6 +67,7 @@ class FinitePartSolver {
  private:
   struct Iterate;
   struct Step;
+  struct Now;
   void evaluate(const GapLines* held, Iterate& iterate, PartEffort& effort) const;
   std::vector<int> candidates(const FiniteSnapshot& at) const;
   Eigen::Vector2d slid(const FiniteSnapshot& from, const FiniteSnapshot& at, int vertex,
@@ -74,6 +75,7 @@ class FinitePartSolver {
   double error_of(const FiniteSnapshot& from, const PartTarget& target, const Iterate& iterate) const;
   bool cover(const PartTarget& target, const Iterate& iterate, const std::vector<int>& block);
   bool factorise(const PartTarget& target, const Iterate& iterate, PartEffort& effort);
+  Now now_at(const FiniteSnapshot& from, const Iterate& iterate, const std::vector<int>& block) const;
   bool find_step(const FiniteSnapshot& from, const PartTarget& target, Iterate& iterate, Step& step,
                  PartEffort& effort);
   std::optional<FiniteSnapshot> finished(Iterate iterate);

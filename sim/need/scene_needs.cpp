@@ -18,7 +18,7 @@ namespace {
 using nlohmann::json;
 
 /// Raised with each change of how needs are measured, or of their file.
-constexpr int kNeedFormat = 1;
+constexpr int kNeedFormat = 2;
 
 std::string text_of(const SceneNeeds& needs) {
   json all = json::array();
@@ -70,6 +70,19 @@ SceneSpec without_accuracy(SceneSpec scene) {
   return scene;
 }
 
+/// What an endlessly fine mesh would change in these states: the error bar of the force.
+EffectNeed mesh_need(std::span<const Truth> truths, std::span<const int> frames) {
+  double most = 0.0;
+  for (const int k : frames) {
+    const Truth& truth = truths[static_cast<std::size_t>(k)];
+    const double force = truth.press.wrench.head<3>().norm();
+    if (force > 0.0) most = std::max(most, truth.error.force.norm() / force);
+  }
+  EffectNeed need{kFinerMesh, {}, {}};
+  need.change.emplace().force_percent = 100.0 * most;
+  return need;
+}
+
 }  // namespace
 
 SceneNeeds measure_needs(const SceneSpec& wanted, const fem::Compliance& gel, const NeedSettings& settings,
@@ -85,6 +98,7 @@ SceneNeeds measure_needs(const SceneSpec& wanted, const fem::Compliance& gel, co
   const std::vector<Truth> truths = play_for_need(scene, plan, gel, cache);
   const std::vector<int> frames = hard_frames(truths);
   if (frames.empty()) return needs;
+  needs.push_back(mesh_need(truths, frames));
   stage(1);
   add_played_needs(scene, plan, gel, truths, frames, cache, needs);
   stage(2);

@@ -36,6 +36,9 @@ struct EffectNeed {
   std::string note;              ///< why not, for people
 };
 
+/// The name of what isn't an effect but changes forces as one: a finer mesh than the device's.
+inline constexpr const char* kFinerMesh = "finer mesh";
+
 /// Of a scene.
 using SceneNeeds = std::vector<EffectNeed>;
 

@@ -7,8 +7,8 @@
 
 namespace touchstone::sim {
 
-/// Of what is allowed: an effect that was measured to change more is taken. A measurement by few pixels on a coarse mesh
-/// may be off by a third: of nine effects one was 0.86 of what is allowed, and 1.07 closely.
+/// Of what is allowed: an effect that was measured to change more is taken. A measurement by few pixels on a coarse
+/// mesh may be off by a third: of nine effects one was 0.86 of what is allowed, and 1.07 closely.
 inline constexpr double kTakenFrom = 0.75;
 
 /// Writes a plan's rows for people.
@@ -34,15 +34,17 @@ class PlanTable {
   }
 
   /// The same of an effect that is called for where it changes more than the accuracy lets out: by `known`, from a
-  /// closed form, or, from kTakenFrom of that on, as it was measured. Where no accuracy is stated, or nothing is known, `called_for` says.
+  /// closed form, or, from kTakenFrom of that on, as it was measured. Where no accuracy is stated, or nothing is known,
+  /// `called_for` says.
   bool add_by_need(const std::string& name, Switch forced, bool called_for, const std::string& why,
                    const std::string& cost, const std::optional<Change>& known = {}) {
     const Change* change = known ? &*known : change_of(needs_, name);
     if (!accuracy_ || change == nullptr) return add(name, forced, called_for, why, cost);
     const bool much = exceeds(*change, known ? *accuracy_ : parts_of(*accuracy_, kTakenFrom));
     const char* close = much && !exceeds(*change, *accuracy_) ? ", and measured so near to that it is taken" : "";
-    const bool on = add(name, forced, much,
-                        fmt::format("{}; leaving it out changes {}{}", why, in_words(*change, *accuracy_), close), cost);
+    const bool on =
+        add(name, forced, much,
+            fmt::format("{}; leaving it out changes {}{}", why, in_words(*change, *accuracy_), close), cost);
     plan_.effects.back().change = *change;
     return on;
   }

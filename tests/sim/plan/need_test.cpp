@@ -110,6 +110,16 @@ TEST(Need, FiniteStrainThatCantBeHadIsLeftOutWithAWarning) {
               AllOf(HasSubstr("finite strain is left out"), HasSubstr("6 %"), HasSubstr("several objects")));
 }
 
+TEST(Need, AMeshThatCantMeetTheAccuracyIsNamedWithTheLeastThereIs) {
+  const SceneSpec scene = wanted("ball-press.yaml", {.force_percent = 0.5});
+  const Plan plan = make_plan(scene, {{kFinerMesh, Change{.force_percent = 1.7}, ""}});
+  ASSERT_FALSE(plan.warnings.empty());
+  EXPECT_THAT(plan.warnings.back(), AllOf(HasSubstr("accuracy.force_percent is 0.5"), HasSubstr("off by 1.7 %"),
+                                          HasSubstr("edges of 0.5 mm")));
+  EXPECT_TRUE(make_plan(scene, {{kFinerMesh, Change{.force_percent = 0.5}, ""}}).warnings.empty());
+  EXPECT_TRUE(make_plan(shipped("ball-press.yaml"), {{kFinerMesh, Change{.force_percent = 1.7}, ""}}).warnings.empty());
+}
+
 TEST(Need, ClosedFormsAreHeldBesideTheAccuracy) {
   SceneSpec scene = wanted("ball-press.yaml");
   scene.device.gel.relaxation = {{0.006, 1e-6}};
