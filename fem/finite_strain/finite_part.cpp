@@ -356,8 +356,14 @@ bool FinitePartSolver::find_step(const FiniteSnapshot& from, const PartTarget& t
         fmt::format("the contact laws have no answer to be found with {} candidates: the gel isn't stable there", m);
     return false;
   }
+  // The hold's own forces count, too: it amplifies what the answer leaves of the laws, which would else be seen.
+  Eigen::VectorXd load = step.answer.z - now.traction;
+  const Eigen::VectorXd left = stiff.ahead + stiff.compliance * step.answer.z;
+  for (std::size_t k = 0; k < now.held.size(); ++k) {
+    load[now.held[k]] -= now.stiffness[static_cast<Eigen::Index>(k)] * left[now.held[k]];
+  }
   right.setZero();
-  push(step.answer.z - now.traction);
+  push(load);
   step.change = back + tangent_->factor->solve(right);
   return true;
 }
