@@ -1,5 +1,6 @@
 #include <spdlog/spdlog.h>
 
+#include <cstdio>
 #include <memory>
 
 #include "apps/command.h"
@@ -24,6 +25,19 @@ void generate(const Options& options, const GlobalOptions& global) {
   datasets::GenerateReport report;
   {
     ProgressBar bar(global.quiet);
+    if (!global.quiet) {
+      how.predicted = [&](const sim::RunCost& cost) {
+        fmt::print("{}\n", sim::in_words(cost));
+        for (const std::string& one : cost.unknown) fmt::print("  not known: {}\n", one);
+        std::fflush(stdout);
+        for (const auto& [stage, seconds] :
+             {std::pair{"elasticity", cost.gel_s}, std::pair{"mechanics", cost.mechanics_s},
+              std::pair{"cameras", cost.cameras_s}, std::pair{"frames", cost.frames_s},
+              std::pair{"samples", cost.frames_s}}) {
+          bar.expect(stage, seconds);
+        }
+      };
+    }
     report = datasets::generate(options.job, options.out, how, bar.listener());
   }
   if (!report.warning.empty()) spdlog::warn("{}", report.warning);

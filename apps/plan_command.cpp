@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
+#include <span>
 
 #include "apps/command.h"
 #include "apps/plan_check.h"
@@ -10,20 +12,35 @@
 #include "core/yaml_reader.h"
 #include "datasets/jobs/prepared_job.h"
 #include "datasets/jobs/scene_plan.h"
+#include "datasets/sets/job_cost.h"
 #include "datasets/sets/planned_draw.h"
 #include "lab/studies/study_plan.h"
+#include "sim/cost/scene_cost.h"
 #include "sim/press/gel_plan.h"
 #include "sim/press/linear_range.h"
 
 namespace touchstone::apps {
 namespace {
 
-void print_plan(const sim::Plan& plan) {
+/// `cost` may be null: then no seconds are printed.
+void print_plan(const sim::Plan& plan, const sim::SceneCost* cost) {
   std::size_t widest = 6;
   for (const sim::Effect& effect : plan.effects) widest = std::max(widest, effect.name.size());
-  fmt::print("{:<{}}  {:<3}  {}\n", "effect", widest, "on", "why (cost)");
+  const auto seconds = [&](const std::string& once, const std::string& frame) {
+    return cost == nullptr ? std::string() : fmt::format("{:>11}  {:>11}  ", once, frame);
+  };
+  fmt::print("{:<{}}  {:<3}  {}{}\n", "effect", widest, "on", seconds("once", "a frame"), "why (cost)");
   for (const sim::Effect& effect : plan.effects) {
-    fmt::print("{:<{}}  {:<3}  {} ({})\n", effect.name, widest, effect.on ? "yes" : "no", effect.why, effect.cost);
+    std::string once, frame;
+    if (cost != nullptr) {
+      for (const sim::EffectCost& one : cost->effects) {
+        if (one.effect != effect.name) continue;
+        if (one.once_s > 0.0) once = sim::seconds_in_words(one.once_s);
+        if (one.frame_s > 0.0) frame = sim::seconds_in_words(one.frame_s);
+      }
+    }
+    fmt::print("{:<{}}  {:<3}  {}{} ({})\n", effect.name, widest, effect.on ? "yes" : "no", seconds(once, frame),
+               effect.why, effect.cost);
   }
   for (const std::string& warning : plan.warnings) spdlog::warn("{}", warning);
 }
@@ -58,48 +75,97 @@ void print_linear_range(const sim::SceneSpec& scene, const GlobalOptions& global
 }
 
 /// The plan of one of several things that are simulated, unless it's that of the one before.
-void print_next(const std::string& title, const sim::Plan& plan, const sim::Plan* before) {
+void print_next(const std::string& title, const sim::Plan& plan, const sim::Plan* before,
+                const sim::SceneCost* cost = nullptr) {
   const bool as_before = before != nullptr && equal(*before, plan);
   fmt::print("{}{}{}\n", as_before ? "" : "\n", title, as_before ? ": as above" : "");
-  if (!as_before) print_plan(plan);
+  if (!as_before) print_plan(plan, cost);
+}
+
+void print_seconds(const sim::RunCost& cost, const sim::MachineRates& rates) {
+  fmt::print("\non {} thread{} of this machine: {}\n", rates.threads, rates.threads == 1 ? "" : "s",
+             sim::in_words(cost));
+  if (rates.threads > 1) fmt::print("the columns above are seconds of one thread\n");
+  for (const std::string& one : cost.unknown) fmt::print("not known: {}\n", one);
+}
+
+/// What `predict` gives, with the seconds of this machine; nothing where they can't be had, which is said.
+template <typename Predict>
+auto predicted(const GlobalOptions& global, const Predict& predict)
+    -> std::optional<decltype(predict(sim::MachineRates(), Progress()))> {
+  try {
+    ProgressBar bar(global.quiet);
+    return predict(sim::machine_rates(global.threads, global.cache, bar.listener()), bar.listener());
+  } catch (const std::exception& error) {
+    spdlog::warn("its seconds aren't known: {}", error.what());
+    return std::nullopt;
+  }
 }
 
 void print_gel(const std::string& title, const sim::DeviceSpec& device, const GlobalOptions& global) {
   fmt::print("\n{}{}", title, describe(sim::plan_gel(device, global.cache)));
 }
 
-void plan_scene(const std::filesystem::path& file, bool linear_range, bool check, const GlobalOptions& global) {
+/// What is printed beside the plan itself.
+struct Asked {
+  bool linear_range = false;
+  bool check = false;
+  bool seconds = true;
+};
+
+void plan_scene(const std::filesystem::path& file, const Asked& asked, const GlobalOptions& global) {
   const sim::SceneSpec scene = sim::read_scene(file);
   sim::Plan planned;
   {
     ProgressBar bar(global.quiet);
     planned = datasets::plan_scene(scene, global.cache, bar.listener());
   }
-  print_plan(planned);
+  std::optional<sim::SceneCost> cost;
+  std::optional<sim::RunCost> all;
+  sim::MachineRates rates;
+  if (asked.seconds) {
+    cost = predicted(global, [&](const sim::MachineRates& measured, const Progress&) {
+      rates = measured;
+      return sim::predict_scene(scene, planned, rates, global.cache);
+    });
+    if (cost) all = sim::run_cost(std::span(&*cost, 1), rates);
+  }
+  print_plan(planned, cost ? &*cost : nullptr);
+  if (all) print_seconds(*all, rates);
   print_gel("", scene.device, global);
-  if (check) print_plan_check(scene, planned, global);
-  if (linear_range) print_linear_range(scene, global);
+  if (asked.check) print_plan_check(scene, planned, global);
+  if (asked.linear_range) print_linear_range(scene, global);
 }
 
-void plan_job(const std::filesystem::path& file, bool linear_range, const GlobalOptions& global) {
+void plan_job(const std::filesystem::path& file, const Asked& asked, const GlobalOptions& global) {
   datasets::PreparedJob job = datasets::prepare_job(file);
   {
     ProgressBar bar(global.quiet);
     datasets::plan_by_need(job, global.cache, bar.listener());
   }
   fmt::print("job {}: {} scenes, {} samples\n", job.job.name, job.scenes.size(), job.samples);
+  std::optional<std::vector<sim::SceneCost>> costs;
+  sim::MachineRates rates;
+  if (asked.seconds) {
+    costs = predicted(global, [&](const sim::MachineRates& measured, const Progress& progress) {
+      rates = measured;
+      return datasets::scene_costs(job, rates, global.cache, progress);
+    });
+  }
   const sim::Plan* before = nullptr;
-  for (const datasets::PreparedScene& scene : job.scenes) {
+  for (std::size_t i = 0; i < job.scenes.size(); ++i) {
+    const datasets::PreparedScene& scene = job.scenes[i];
     print_next(
         fmt::format("{} ({}, {} samples)", scene.entry.name, datasets::name_of(scene.entry.split), scene.samples),
-        scene.plan, before);
+        scene.plan, before, costs ? &(*costs)[i] : nullptr);
     before = &scene.plan;
   }
+  if (costs) print_seconds(sim::run_cost(*costs, rates), rates);
   print_gel("", job.scenes.front().spec.device, global);
-  if (linear_range) print_linear_range(job.scenes.front().spec, global);
+  if (asked.linear_range) print_linear_range(job.scenes.front().spec, global);
 }
 
-void plan_draw(const std::filesystem::path& file, bool linear_range, const GlobalOptions& global) {
+void plan_draw(const std::filesystem::path& file, const Asked& asked, const GlobalOptions& global) {
   const datasets::PreparedDraw draw = datasets::prepare_draw(file);
   const std::vector<datasets::PlannedDraw> planned = datasets::planned_draws(draw);
   const std::size_t objects = draw.job.draw.objects.size();
@@ -125,8 +191,16 @@ void plan_draw(const std::filesystem::path& file, bool linear_range, const Globa
         "\nThe gel is milky under a coating: pictures are made from maps of it where these are found to be good "
         "enough, else by path tracing.\n");
   }
+  if (asked.seconds) {
+    sim::MachineRates rates;
+    const auto all = predicted(global, [&](const sim::MachineRates& measured, const Progress& progress) {
+      rates = measured;
+      return datasets::draw_cost(draw, rates, global.cache, progress);
+    });
+    if (all) print_seconds(*all, rates);
+  }
   print_gel(fmt::format("unit {}'s ", first.unit), first.scene.device, global);
-  if (linear_range) print_linear_range(first.scene, global);
+  if (asked.linear_range) print_linear_range(first.scene, global);
 }
 
 void plan_study(const std::filesystem::path& file, bool linear_range, const GlobalOptions& global) {
@@ -161,20 +235,20 @@ constexpr UnplannedFile kUnplanned[] = {
     {"lump", "it is a palpation's file; `touchstone validate vhs.palpation` presses its lumps by a law of their own"},
 };
 
-void plan(const std::filesystem::path& file, bool linear_range, bool check, const GlobalOptions& global) {
+void plan(const std::filesystem::path& file, const Asked& asked, const GlobalOptions& global) {
   const YamlReader in = YamlReader::open(file);
-  if (check && (in.has("draw") || in.has("scenes") || in.has("kind") || in.has("vary"))) {
+  if (asked.check && (in.has("draw") || in.has("scenes") || in.has("kind") || in.has("vary"))) {
     fail("{}: --check takes a scene's file", file.string());
   }
-  if (in.has("draw")) return plan_draw(file, linear_range, global);
-  if (in.has("scenes")) return plan_job(file, linear_range, global);
-  if (in.has("kind") || in.has("vary")) return plan_study(file, linear_range, global);
+  if (in.has("draw")) return plan_draw(file, asked, global);
+  if (in.has("scenes")) return plan_job(file, asked, global);
+  if (in.has("kind") || in.has("vary")) return plan_study(file, asked.linear_range, global);
   for (const UnplannedFile& kind : kUnplanned) {
     if (!in.has(kind.key) || in.has("object")) continue;  // a scene with a key too many is refused as a scene
     fail("{}: {}; `touchstone plan` takes scenes, jobs of scenes, jobs that draw, and studies", file.string(),
          kind.words);
   }
-  plan_scene(file, linear_range, check, global);
+  plan_scene(file, asked, global);
 }
 
 }  // namespace
@@ -184,17 +258,17 @@ void add_plan_command(CLI::App& app, const GlobalOptions& global, Action& action
       app.add_subcommand("plan", "Show which effects a scene, a job or a study calls for, why, and their cost");
   auto file = std::make_shared<std::filesystem::path>();
   command->add_option("SCENE|JOB|STUDY", *file, "Scene file, job file of either kind, or study file")->required();
-  auto linear_range = std::make_shared<bool>(false);
-  command->add_flag("--linear-range", *linear_range,
+  auto asked = std::make_shared<Asked>();
+  command->add_flag("--linear-range", asked->linear_range,
                     "Also press the (first) scene's object by finite strain, and tell how far the forces of linear "
                     "elasticity are off and what each costs (half a minute and more)");
-  auto check = std::make_shared<bool>(false);
-  command->add_flag("--check", *check,
+  command->add_flag("--check", asked->check,
                     "Also simulate the scene's hardest states closely, with each effect the other way, and print what "
                     "that changes beside what the plan goes by (a scene's file; a minute and more)");
-  command->callback([&action, &global, file, linear_range, check] {
-    action = [&global, file, linear_range, check] { plan(*file, *linear_range, *check, global); };
-  });
+  command->add_flag("!--no-seconds", asked->seconds,
+                    "Leave out the seconds that it takes on this machine, which are found in some seconds");
+  command->callback(
+      [&action, &global, file, asked] { action = [&global, file, asked] { plan(*file, *asked, global); }; });
 }
 
 }  // namespace touchstone::apps

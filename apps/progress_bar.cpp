@@ -57,6 +57,11 @@ Progress ProgressBar::listener() {
   return [this](const std::string& stage, std::int64_t done, std::int64_t total) { show(stage, done, total); };
 }
 
+void ProgressBar::expect(const std::string& stage, double seconds) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  expected_s_[stage] = seconds;
+}
+
 void ProgressBar::show(const std::string& stage, std::int64_t done, std::int64_t total) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const Clock::time_point now = Clock::now();
@@ -81,7 +86,10 @@ void ProgressBar::draw(Clock::time_point now) {
   const double part = total_ > 0 ? static_cast<double>(done_) / static_cast<double>(total_) : 0.0;
   std::string text = fmt::format("{}/{}", done_, total_);
   if (rate > 0.0) text += fmt::format("  {:.3g}/s", rate);
-  if (done_ >= total_ || rate == 0.0) {
+  const auto expected = expected_s_.find(stage_);
+  if (done_ < total_ && rate == 0.0 && expected != expected_s_.end()) {
+    text += fmt::format("  about {} left", duration_text(std::max(0.0, expected->second - elapsed)));
+  } else if (done_ >= total_ || rate == 0.0) {
     text += "  in " + duration_text(elapsed);
   } else {
     text += "  " + duration_text(static_cast<double>(total_ - done_) / rate) + " left";

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
+#include <map>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -23,6 +24,8 @@ class ProgressBar {
 
   /// What long work calls; valid as long as this object lives.
   Progress listener();
+  /// How long a stage will take, as far as that is known before it begins: shown as the time left until its steps tell.
+  void expect(const std::string& stage, double seconds);
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -43,6 +46,7 @@ class ProgressBar {
   Clock::time_point last_drawn_;
   bool closed_ = false;
   std::condition_variable closing_;
+  std::map<std::string, double> expected_s_;  // by stage
   std::thread clock_;
 };
 

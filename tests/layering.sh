@@ -50,9 +50,10 @@ sim/press: core fem/mesh fem/elements fem/shapes fem/contact fem/finite_strain f
 sim/view: core fem/mesh fem/elements fem/shapes fem/contact fem/fine_relief render/scene render/cameras render/paths sim/files sim/scene sim/plan
 sim/sensor: core fem/elements fem/shapes fem/contact fem/error fem/fine_relief fem/vibration render/spectra render/scene render/cameras render/paths render/direct render/membrane render/imager render/events sim/files sim/scene sim/plan sim/press sim/view
 sim/need: core fem/mesh fem/elements fem/contact fem/finite_strain render/paths render/imager sim/scene sim/plan sim/press sim/view
+sim/cost: core fem/mesh fem/elements fem/shapes fem/contact fem/finite_strain fem/error render/cameras render/paths render/imager sim/files sim/scene sim/plan sim/press sim/view sim/sensor
 sim/grasp: core fem/mesh fem/elements fem/contact fem/error fem/fine_relief fem/vibration sim/scene sim/press
 datasets/jobs: core render/lamps sim/relief sim/scene sim/plan sim/press sim/sensor sim/need
-datasets/sets: core fem/elements sensors/events sim/files sim/scene sim/plan sim/press sim/view sim/sensor datasets/jobs
+datasets/sets: core fem/elements sensors/events sim/files sim/scene sim/plan sim/press sim/view sim/sensor sim/cost datasets/jobs
 datasets/exports: core sim/files datasets/sets
 datasets/inspection: core plots render/cameras render/imager sim/files sim/scene sim/plan sim/view datasets/jobs datasets/sets
 lab/statistics: core
@@ -68,11 +69,11 @@ lab/chroma: core plots fem/contact fem/finite_strain render/spectra render/scene
 lab/dvs: core render/membrane render/events sensors/learning sensors/events sim/scene sim/press sim/sensor sim/grasp datasets/sets lab/validation
 lab/reflex: core fem/contact fem/finite_strain render/cameras render/paths render/direct render/imager sensors/reflex sim/scene sim/plan sim/press sim/view datasets/sets lab/validation
 lab/studies: core plots fem/mesh fem/elements fem/shapes fem/contact render/sampling render/imager sensors/beads sensors/tractions sim/scene sim/plan sim/press sim/view sim/sensor datasets/jobs lab/validation lab/press lab/vhs lab/chroma
-lab/bench: core plots fem/mesh fem/elements fem/shapes fem/contact fem/error render/imager sim/scene sim/plan sim/press sim/view sim/sensor sim/need datasets/sets lab/statistics lab/studies
+lab/bench: core plots fem/mesh fem/elements fem/shapes fem/contact fem/error render/imager sim/files sim/scene sim/plan sim/press sim/view sim/sensor sim/need sim/cost datasets/sets lab/statistics lab/studies
 lab/likeness: core render/imager sensors/heights sim/files sim/scene sim/sensor datasets/inspection lab/gelsight
 lab/fit: core render/imager sensors/heights sim/files sim/relief sim/scene sim/press sim/view sim/sensor datasets/jobs datasets/sets datasets/inspection lab/validation lab/gelsight lab/studies lab/likeness
 lab/schema: core sim/scene datasets/jobs lab/vhs lab/studies lab/fit
-apps: core plots render/imager sensors/beads sensors/heights sensors/colour sensors/tractions sensors/events sim/files sim/scene sim/plan sim/press sim/view sim/sensor sim/need datasets/jobs datasets/sets datasets/exports datasets/inspection lab/validation lab/press lab/device lab/vhs lab/gelsight lab/dtact lab/chroma lab/dvs lab/studies lab/bench lab/likeness lab/fit lab/schema
+apps: core plots render/imager sensors/beads sensors/heights sensors/colour sensors/tractions sensors/events sim/files sim/scene sim/plan sim/press sim/view sim/sensor sim/need sim/cost datasets/jobs datasets/sets datasets/exports datasets/inspection lab/validation lab/press lab/device lab/vhs lab/gelsight lab/dtact lab/chroma lab/dvs lab/studies lab/bench lab/likeness lab/fit lab/schema
 python: core sensors/beads sensors/heights sensors/colour sim/files sim/scene sim/press sim/sensor datasets/jobs datasets/sets
 testing: core sim/files sim/press sim/sensor datasets/jobs lab/device
 END

@@ -15,6 +15,7 @@
 #include "core/whole_file.h"
 #include "datasets/sets/block_file.h"
 #include "datasets/sets/data_card.h"
+#include "datasets/sets/job_cost.h"
 #include "datasets/sets/manifest_parts.h"
 #include "datasets/sets/planned_draw.h"
 #include "datasets/sets/run_folder.h"
@@ -173,6 +174,29 @@ std::pair<std::size_t, std::size_t> blocks_of(const Shard& shard, std::size_t al
   return {all * (number - 1) / count, all * number / count};
 }
 
+/// Tells what the blocks of the shard that aren't there yet will take.
+void predict(const PreparedDraw& prepared, const Folder& folder, const GenerateOptions& options,
+             const Progress& progress) {
+  const auto [first, end] = blocks_of(options.shard, prepared.blocks.size());
+  double missing = 0.0;
+  for (std::size_t k = first; k < end; ++k) {
+    if (state_of_block(folder.out, folder.checksum, prepared.blocks[k]) != BlockState::whole)
+      missing += static_cast<double>(prepared.blocks[k].samples);
+  }
+  try {
+    const sim::MachineRates rates = sim::machine_rates(options.threads, options.cache, progress);
+    sim::RunCost cost = draw_cost(prepared, rates, options.cache, progress);
+    const double part = missing / static_cast<double>(prepared.job.samples);
+    cost.mechanics_s *= part;
+    cost.cameras_s *= part;
+    cost.frames_s *= part;
+    cost.frames = static_cast<int>(missing);
+    options.predicted(cost);
+  } catch (const Error&) {
+    // What is wrong with a unit is said where it is made.
+  }
+}
+
 }  // namespace
 
 GenerateReport generate_draw(const PreparedDraw& prepared, const fs::path& out, const GenerateOptions& options,
@@ -193,6 +217,7 @@ GenerateReport generate_draw(const PreparedDraw& prepared, const fs::path& out, 
   std::error_code error;
   fs::create_directories(out / "blocks", error);
   if (error) fail("{}: can't be made ({})", (out / "blocks").string(), error.message());
+  if (options.predicted) predict(prepared, folder, options, progress);
   std::unique_ptr<UnitSensor> sensor;
   std::optional<DrawnUnit> unit;
   std::atomic<std::int64_t> done{0};

@@ -19,6 +19,7 @@
 #include "core/progress.h"
 #include "datasets/sets/block_record.h"
 #include "datasets/sets/sample_source.h"
+#include "sim/cost/scene_cost.h"
 
 namespace touchstone::datasets {
 
@@ -37,6 +38,9 @@ struct GenerateOptions {
   std::filesystem::path cache;  ///< where what effects change is kept; empty: nowhere
   int threads = 0;              ///< at most so many; 0: as many as the machine has
   Shard shard;                  ///< of a job with `draw`; 1 of 1: everything, and then what merge does
+  /// Hears, before anything is made, what the run will take on this machine, so many samples being there already.
+  /// Empty: nothing is predicted, which takes seconds itself.
+  std::function<void(const sim::RunCost&)> predicted;
   bool timings =
       true;  ///< put wall times in a set of scenes' manifest; without them the folder is the same in every run
 };

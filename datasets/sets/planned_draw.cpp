@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "core/error.h"
 #include "datasets/sets/block_record.h"
 
 namespace touchstone::datasets {
@@ -28,9 +29,15 @@ PlannedDraw planned(const PreparedDraw& prepared, const DrawnTouch& touch) {
   one.object = prepared.job.draw.objects[static_cast<std::size_t>(touch.object)].file.stem().string();
   one.sample = touch.sample;
   one.unit = touch.unit;
-  // Where the first touch is makes no difference to a plan, and a sample that misses the gel is drawn again.
+  // A sample that misses the gel is drawn again; to its plan it makes no difference where it would touch.
+  double touch_mm = 0.0;
+  try {
+    touch_mm = sim::first_touch(press_of(touch), object, unit.device.gel);
+  } catch (const Error&) {
+    touch_mm = 0.0;
+  }
   const double rate_Hz = unit.device.camera ? unit.device.camera->frame_rate_Hz : sim::MotionSpec().frame_rate_Hz;
-  const sim::MotionSpec motion = sim::press_motion(press_of(touch), 0.0, object.friction, rate_Hz);
+  const sim::MotionSpec motion = sim::press_motion(press_of(touch), touch_mm, object.friction, rate_Hz);
   one.scene = sim::touch_scene(unit.device, drawn_sensor_settings(prepared, unit), object, motion, wanted.camera());
   one.by_maps = wanted.camera() && !one.scene.outputs.camera();
   if (one.scene.outputs.camera()) one.scene.outputs = outputs_of(wanted);

@@ -89,9 +89,14 @@ std::string scene_manifest(const PreparedJob& job, const RunIdentity& identity, 
     manifest["files"].push_back(file_json(file));
   }
   if (timings != nullptr) {
-    ordered_json stages = ordered_json::object();
-    for (const auto& [stage, seconds] : timings->stages) stages[stage] = seconds;
-    manifest["timings"] = {{"wall_s", stages}, {"threads", timings->threads}, {"samples_made", timings->samples_made}};
+    const auto by_stage = [](const std::vector<std::pair<std::string, double>>& all) {
+      ordered_json stages = ordered_json::object();
+      for (const auto& [stage, seconds] : all) stages[stage] = seconds;
+      return stages;
+    };
+    manifest["timings"] = {
+        {"wall_s", by_stage(timings->stages)}, {"threads", timings->threads}, {"samples_made", timings->samples_made}};
+    if (!timings->predicted.empty()) manifest["timings"]["predicted_s"] = by_stage(timings->predicted);
   }
   return manifest_text(std::move(manifest));
 }

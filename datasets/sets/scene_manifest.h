@@ -25,7 +25,8 @@ struct CountedWork {
 
 /// Wall times and what they are for: different in every run.
 struct RunTimings {
-  std::vector<std::pair<std::string, double>> stages;  ///< name, seconds; in the order of the work
+  std::vector<std::pair<std::string, double>> stages;     ///< name, seconds; in the order of the work
+  std::vector<std::pair<std::string, double>> predicted;  ///< the same as they were predicted; none: nothing was
   int threads = 0;
   std::int64_t samples_made = 0;  ///< by the run that finished the set; fewer than all if it went on from another
 };

@@ -13,6 +13,7 @@
 #include "core/sha256.h"
 #include "core/whole_file.h"
 #include "datasets/jobs/scene_plan.h"
+#include "datasets/sets/job_cost.h"
 #include "datasets/sets/manifest.h"
 #include "datasets/sets/run_folder.h"
 #include "datasets/sets/scene_manifest.h"
@@ -85,6 +86,19 @@ class Run {
  public:
   Run(const PreparedJob& job, const fs::path& out, const SampleSource& source, const Progress& progress)
       : job_(job), out_(out), source_(source), progress_(progress) {}
+
+  void predict(const GenerateOptions& options, std::size_t kept) {
+    if (!options.predicted) return;
+    try {
+      const sim::MachineRates rates = sim::machine_rates(options.threads, options.cache, progress_);
+      predicted_ = sim::run_cost(scene_costs(job_, rates, options.cache, progress_), rates);
+      predicted_->frames_s *= 1.0 - std::min(1.0, static_cast<double>(kept) / static_cast<double>(job_.samples));
+      options.predicted(*predicted_);
+    } catch (const Error&) {
+      // What is wrong with a scene is said where it is simulated.
+    }
+    clock_.end("prediction");
+  }
 
   void mechanics() {
     gel_ = source_.set_up_gel(job_.scenes.front().spec.device, progress_);
@@ -182,6 +196,12 @@ class Run {
     std::sort(files.begin(), files.end(), [](const WrittenFile& a, const WrittenFile& b) { return a.name < b.name; });
     RunTimings timings;
     timings.stages = clock_.stages;
+    if (predicted_) {
+      timings.predicted = {{"gel", predicted_->gel_s},
+                           {"mechanics", predicted_->mechanics_s},
+                           {"cameras", predicted_->cameras_s},
+                           {"frames", predicted_->frames_s}};
+    }
     timings.threads = options.threads > 0 ? options.threads : tbb::info::default_concurrency();
     timings.samples_made = report_.made;
     write_manifest(
@@ -328,6 +348,7 @@ class Run {
   std::vector<std::optional<FrameRecord>> records_;  // of each sample, then of each scene's stream of events
   std::vector<ArrayShape> arrays_;
   GenerateReport report_;
+  std::optional<sim::RunCost> predicted_;
 };
 
 }  // namespace
@@ -351,8 +372,10 @@ GenerateReport generate_scenes(const PreparedJob& job, const fs::path& out, cons
   PreparedJob planned = job;
   plan_by_need(planned, options.cache, progress);
   Run run(planned, out, options.scenes, progress);
+  const std::vector<FrameRecord> kept = folder.whole_records();
+  run.predict(options, kept.size());
   run.mechanics();
-  run.pictures(folder, folder.whole_records());
+  run.pictures(folder, kept);
   run.truth();
   run.manifest(identity, options);
   folder.finish();

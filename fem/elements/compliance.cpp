@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/memory_left.h"
 #include "fem/elements/element.h"
+#include "fem/elements/elimination_groups.h"
 #include "fem/elements/quasi_definite_schur.h"
 #include "fem/elements/surface_coupling.h"
 #include "fem/elements/taylor_hood.h"
@@ -31,6 +32,51 @@ void add_border(const Eigen::SparseMatrix<double>& rows, double scale, int first
       }
     }
   }
+}
+
+/// The Taylor-Hood system, or another element's, bordered by what is asked for: three rows a surface vertex, then three
+/// a bead. Without units a surface row is int phi_i u / length^2, a bead's row a mean. Both are scaled so that the
+/// border is of the order of one beside the elements' blocks.
+struct BorderedSystem {
+  Scales scales;
+  OuterSurface surface;
+  ElementSystem system;
+  Eigen::SparseMatrix<double> surface_rows;
+  double surface_scale = 0.0;
+  int unknowns = 0;  ///< without the border
+  int border = 0;
+};
+
+BorderedSystem bordered_system(const TetMesh& mesh, std::span<const ElasticMaterial> materials,
+                               std::span<const Bead> beads, Element element) {
+  const TaylorHoodSpace space = make_space(mesh, materials);
+  BorderedSystem out;
+  out.scales = make_scales(mesh, materials);
+  out.surface = outer_surface(mesh);
+  const int n = static_cast<int>(out.surface.mesh_vertex.size());
+  const int m = static_cast<int>(beads.size());
+  if (n > kMostSurfaceVertices) {
+    fail("the gel's outer surface has {} vertices; at most {} are allowed: mesh the surface coarser", n,
+         kMostSurfaceVertices);
+  }
+  if (m > kMostBeads) fail("there are {} beads; at most {} are allowed", m, kMostBeads);
+  const double edge = 1.0 / std::sqrt(static_cast<double>(mesh.outer.size()));
+  out.surface_scale = 1.0 / (out.scales.length * out.scales.length * edge);
+  out.system = make_system(space, out.scales, materials, element);
+  out.unknowns = out.system.matrix.size;
+  out.surface_rows = over_nodes_of(element, space, surface_coupling(space, out.surface));
+  add_border(out.surface_rows, out.surface_scale, out.unknowns, out.system);
+  add_border(over_nodes_of(element, space, bead_means(space, beads)), 1.0, out.unknowns + 3 * n, out.system);
+  out.border = 3 * (n + m);
+  out.system.matrix.size = out.unknowns + out.border;
+  return out;
+}
+
+double operations_of(const ElementSystem& system, int border) {
+  EliminationGroups plan(system.matrix, border, system.tree);
+  double operations = 0.0;
+  for (const int root : plan.roots()) operations += plan.groups()[static_cast<std::size_t>(root)].work;
+  return operations;
 }
 
 /// The surface's compliance with its far parts compressed, and the beads' rows.
@@ -136,27 +182,13 @@ Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMateri
   const std::size_t tetrahedra = mesh.tetrahedra.size();
   require_memory(setup_bytes(static_cast<double>(tetrahedra)), fmt::format("to set up {} tetrahedra", tetrahedra));
   tell(0);
-  const TaylorHoodSpace space = make_space(mesh, materials);
-  const Scales scales = make_scales(mesh, materials);
-  const OuterSurface surface = outer_surface(mesh);
+  BorderedSystem bordered = bordered_system(mesh, materials, beads, element);
+  ElementSystem& system = bordered.system;
+  const Scales& scales = bordered.scales;
+  const OuterSurface& surface = bordered.surface;
+  const double surface_scale = bordered.surface_scale;
   const int n = static_cast<int>(surface.mesh_vertex.size());
   const int m = static_cast<int>(beads.size());
-  if (n > kMostSurfaceVertices) {
-    fail("the gel's outer surface has {} vertices; at most {} are allowed: mesh the surface coarser", n,
-         kMostSurfaceVertices);
-  }
-  if (m > kMostBeads) fail("there are {} beads; at most {} are allowed", m, kMostBeads);
-
-  // Without units, a surface row is int phi_i u / length^2, a bead's row a mean. Both are scaled so that the border is
-  // of the order of one beside the elements' blocks.
-  const double edge = 1.0 / std::sqrt(static_cast<double>(mesh.outer.size()));
-  const double surface_scale = 1.0 / (scales.length * scales.length * edge);
-  ElementSystem system = make_system(space, scales, materials, element);
-  const int unknowns = system.matrix.size;
-  const Eigen::SparseMatrix<double> surface_rows = over_nodes_of(element, space, surface_coupling(space, surface));
-  add_border(surface_rows, surface_scale, unknowns, system);
-  add_border(over_nodes_of(element, space, bead_means(space, beads)), 1.0, unknowns + 3 * n, system);
-  system.matrix.size = unknowns + 3 * (n + m);
   tell(1);
 
   FactorReport factor;
@@ -166,14 +198,15 @@ Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMateri
   const double surface_factor = -displacement_per_traction / (surface_scale * surface_scale);
   const double bead_factor = -displacement_per_traction / surface_scale;
   if (is_kept_whole(n, m, most_whole)) {
-    std::optional<Eigen::MatrixXd> found = quasi_definite_schur(system.matrix, 3 * (n + m), system.tree, &factor);
+    std::optional<Eigen::MatrixXd> found = quasi_definite_schur(system.matrix, bordered.border, system.tree, &factor);
     if (!found) {  // slower, but it can pivot
-      found = schur_complement(system.matrix, 3 * (n + m), system.tree.order, &factor);
+      found = schur_complement(system.matrix, bordered.border, system.tree.order, &factor);
     }
     gel.surface = Eigen::MatrixXd(found->topLeftCorner(3 * n, 3 * n) * surface_factor);
     gel.beads = Eigen::MatrixXd(found->bottomLeftCorner(3 * m, 3 * n) * bead_factor);
   } else {
-    CompressedBorder found = compress_border(std::move(system), surface_rows, surface_scale, mesh, surface, m, factor);
+    CompressedBorder found =
+        compress_border(std::move(system), bordered.surface_rows, surface_scale, mesh, surface, m, factor);
     gel.surface = found.surface.scaled(surface_factor);
     gel.beads = Eigen::MatrixXd(found.beads * bead_factor);
     gel.report.compression_error = found.error;
@@ -189,13 +222,25 @@ Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMateri
   gel.mass = surface_mass(mesh, surface);
 
   gel.report.tetrahedra = static_cast<int>(mesh.tetrahedra.size());
-  gel.report.unknowns = unknowns;
+  gel.report.unknowns = bordered.unknowns;
   gel.report.smallest_dihedral_deg = smallest_dihedral_angle(mesh) * 180.0 / std::numbers::pi;
   gel.report.factor_entries = static_cast<double>(factor.factor_entries);
   gel.report.operations = factor.operations;
   gel.report.memory_mb = factor.memory_mb;
   tell(3);
   return gel;
+}
+
+EliminationCount count_elimination(const TetMesh& mesh, std::span<const ElasticMaterial> materials,
+                                   std::span<const Bead> beads) {
+  const BorderedSystem bordered = bordered_system(mesh, materials, beads, Element::taylor_hood);
+  return {static_cast<double>(bordered.unknowns), static_cast<double>(bordered.border),
+          operations_of(bordered.system, bordered.border)};
+}
+
+double count_factorisation(const TetMesh& mesh, std::span<const ElasticMaterial> materials) {
+  const TaylorHoodSpace space = make_space(mesh, materials);
+  return operations_of(make_system(space, make_scales(mesh, materials), materials, Element::taylor_hood), 0);
 }
 
 double setup_bytes(double tetrahedra) {

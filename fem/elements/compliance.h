@@ -64,6 +64,23 @@ Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMateri
 Compliance compute_compliance(const TetMesh& mesh, const ElasticMaterial& material, std::span<const Bead> beads,
                               double thickness, const Progress& progress = {});  ///< the same in all regions
 
+/// What eliminating a gel's inside takes, counted before there is any number.
+struct EliminationCount {
+  double unknowns = 0.0;    ///< displacements and pressures
+  double border = 0.0;      ///< rows of the surface and of beads
+  double operations = 0.0;  ///< floating-point; of a surface whose far parts are compressed more than it takes
+};
+
+/// Of what compute_compliance() would do with the same arguments, as its report has it; costs some percent of that.
+/// @throws Error as compute_compliance(), but for want of memory
+EliminationCount count_elimination(const TetMesh& mesh, std::span<const ElasticMaterial> materials,
+                                   std::span<const Bead> beads);
+
+/// Operations of one factorisation of the whole gel without a border, as each Newton iterate at finite strain makes
+/// one.
+/// @throws Error likewise
+double count_factorisation(const TetMesh& mesh, std::span<const ElasticMaterial> materials);
+
 /// Bytes that this takes at the most for so many tetrahedra, on four threads, within some 40 %.
 double setup_bytes(double tetrahedra);
 

@@ -388,16 +388,21 @@ LadderGel ladder_of(const SlabMesh& slab, const ElasticMaterial& material, std::
   return ladder_of(SlabGel{slab, {}}, std::span(&material, 1), beads);
 }
 
-MeshErrorTable measure_mesh_error(const Compliance& gel, const LadderGel& ladder, const Progress& progress) {
-  const double coarsest = std::min(kCoarsest, ladder.largest_factor);
+std::vector<double> ladder_factors(double largest_factor) {
+  const double coarsest = std::min(kCoarsest, largest_factor);
   if (coarsest < kLeastCoarsest) return {};
+  return {coarsest == kCoarsest ? kMiddle : std::sqrt(coarsest), coarsest};
+}
+
+MeshErrorTable measure_mesh_error(const Compliance& gel, const LadderGel& ladder, const Progress& progress) {
+  const std::vector<double> factors = ladder_factors(ladder.largest_factor);
+  if (factors.empty()) return {};
   std::vector<Level> levels(1);
   levels.front().gel = gel;
   levels.front().to_first.resize(gel.mass.cols(), gel.mass.cols());
   levels.front().to_first.setIdentity();
-  const std::array<double, 2> factors = {coarsest == kCoarsest ? kMiddle : std::sqrt(coarsest), coarsest};
   for (std::size_t k = 0; k < factors.size(); ++k) {
-    if (progress) progress("mesh error", static_cast<std::int64_t>(k), factors.size() + 2);
+    if (progress) progress("mesh error", static_cast<std::int64_t>(k), static_cast<std::int64_t>(factors.size() + 2));
     try {
       levels.push_back({factors[k], ladder.with_edges(factors[k]), {}});
     } catch (const Error&) {
@@ -408,9 +413,13 @@ MeshErrorTable measure_mesh_error(const Compliance& gel, const LadderGel& ladder
   if (levels.size() < 2) return {};
   MeshErrorTable table;
   table.smooth = measure_body(levels, ladder, false);
-  if (progress) progress("mesh error", factors.size() + 1, factors.size() + 2);
+  if (progress)
+    progress("mesh error", static_cast<std::int64_t>(factors.size() + 1),
+             static_cast<std::int64_t>(factors.size() + 2));
   table.sharp = measure_body(levels, ladder, true);
-  if (progress) progress("mesh error", factors.size() + 2, factors.size() + 2);
+  if (progress)
+    progress("mesh error", static_cast<std::int64_t>(factors.size() + 2),
+             static_cast<std::int64_t>(factors.size() + 2));
   return table;
 }
 

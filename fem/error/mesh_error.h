@@ -13,6 +13,7 @@
 #include <Eigen/Core>
 #include <functional>
 #include <span>
+#include <vector>
 
 #include "fem/elements/compliance.h"
 #include "fem/mesh/gel_body.h"
@@ -28,6 +29,10 @@ struct LadderGel {
   std::function<Compliance(double factor)> with_edges;
   double largest_factor = 2.0;  ///< coarser isn't a mesh of that gel any more
 };
+
+/// By what the edges of the ladder's coarser gels are multiplied, rising; none where the gel can't be meshed 1.3 times
+/// as coarsely. `largest_factor` as LadderGel's.
+std::vector<double> ladder_factors(double largest_factor);
 
 /// The ladder of a gel: radii as far as its fine part goes, edges up to its thickness.
 LadderGel ladder_of(const GelBody& body, std::span<const ElasticMaterial> materials, std::span<const Bead> beads);

@@ -3,8 +3,10 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/error.h"
 #include "fem/elements/compliance.h"
 #include "fem/elements/compliance_file.h"
+#include "fem/error/mesh_error.h"
 
 namespace touchstone::fem {
 namespace {
@@ -21,6 +23,28 @@ SetupEstimate estimate_setup(const SlabMesh& slab, int beads) {
   estimate.file_bytes = compliance_file_bytes(static_cast<int>(std::lround(estimate.surface_vertices)), beads);
   estimate.setup_bytes = fem::setup_bytes(estimate.tetrahedra);
   return estimate;
+}
+
+SetupCount count_setup(const GelBody& body, std::span<const ElasticMaterial> materials, std::span<const Bead> beads) {
+  SetupCount sum;
+  EliminationCount& all = sum.eliminations;
+  const auto add = [&](const GelBody& one) {
+    const EliminationCount count = count_elimination(mesh_gel(one), materials, beads);
+    all.unknowns += count.unknowns;
+    all.border += count.border;
+    all.operations += count.operations;
+  };
+  add(body);
+  const std::vector<double> factors = ladder_factors(ladder_of(body, materials, beads).largest_factor);
+  for (const double factor : factors) {
+    try {
+      add(with_edges(body, factor));
+    } catch (const Error&) {
+      continue;  // set-up leaves it out, too
+    }
+  }
+  if (!factors.empty()) sum.pressed_rows = all.border;
+  return sum;
 }
 
 double press_bytes(double edge, double reach) {

@@ -120,6 +120,17 @@ DirectError measure_direct_error(const cv::Mat& picture, const Scene& scene, con
   return direct_error_beside(traced, picture, mask);
 }
 
+LightFieldSettings light_field_settings(const Scene& rest, const Eigen::AlignedBox3d& reach,
+                                        const DirectChoiceSettings& settings) {
+  LightFieldSettings light;
+  light.accuracy =
+      settings.field_accuracy > 0.0 ? settings.field_accuracy : std::clamp(0.5 * settings.tolerance, 1e-4, 1e-2);
+  light.guides = settings.guides;
+  light.lit_radius = settings.lit_radius;
+  light.walls = walls_round_sheet(rest, reach);
+  return light;
+}
+
 DirectChoice choose_direct(const Scene& rest, const Scene& first, const Camera& camera,
                            const Eigen::AlignedBox3d& reach, const DirectChoiceSettings& settings) {
   if (!(settings.tolerance > 0.0) || !std::isfinite(settings.tolerance)) {
@@ -137,13 +148,7 @@ DirectChoice choose_direct(const Scene& rest, const Scene& first, const Camera& 
   direct.interreflection = false;
   LightField field;
   try {
-    LightFieldSettings light;
-    light.accuracy =
-        settings.field_accuracy > 0.0 ? settings.field_accuracy : std::clamp(0.5 * settings.tolerance, 1e-4, 1e-2);
-    light.guides = settings.guides;
-    light.lit_radius = settings.lit_radius;
-    light.walls = walls_round_sheet(rest, reach);
-    field = make_light_field(direct, reach, light);
+    field = make_light_field(direct, reach, light_field_settings(rest, reach, settings));
   } catch (const Error& error) {
     choice.reason = error.what();
     return choice;

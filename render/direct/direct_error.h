@@ -65,6 +65,10 @@ struct DirectChoiceSettings {
   RestLightSettings rest;  ///< used where the scene asks for interreflection
 };
 
+/// Of the light field that choose_direct makes.
+LightFieldSettings light_field_settings(const Scene& rest, const Eigen::AlignedBox3d& reach,
+                                        const DirectChoiceSettings& settings);
+
 /// Makes a renderer for the fixture of `rest` and measures it on `first`, a pressed state: the choice between direct
 /// light and paths by measurement. Where the scene asks for interreflection, the bounced light of `rest` is carried
 /// along. `reach` is the box that lit things stay in (LightField::reach).

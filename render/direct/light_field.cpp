@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "core/error.h"
@@ -212,20 +213,27 @@ struct Maker {
     });
   }
 
+  /// Every cell of a small grid; of a large one some 1000 that are spread evenly: their root mean square is known to
+  /// some percent, and looking at all would take longer than the nodes.
+  struct LookedAt {
+    Eigen::Array3i cells;
+    int stride, count;
+    LookedAt(const LightField& field, const Eigen::Array3d& offset)
+        : cells(field.nodes - (offset > 0.0).cast<int>()),
+          stride(std::max(1, cells.prod() / 1000) | 1),
+          count((cells.prod() + stride - 1) / stride) {}
+  };
+
   /// Relative error at points set off from nodes by `offset` steps.
   double error(const LightField& field, const Eigen::Array3d& offset) const {
     const int beams = field.beam_count();
-    const Eigen::Array3i cells = field.nodes - (offset > 0.0).cast<int>();
-    // Every cell of a small grid; of a large one some 1000 that are spread evenly: their root mean square is known to
-    // some percent, and looking at all would take longer than the nodes.
-    const int all = cells.prod();
-    const int stride = std::max(1, all / 1000) | 1;
-    const int looked_at = (all + stride - 1) / stride;
-    std::vector<std::array<double, 2>> squares(looked_at, {0.0, 0.0});
+    const LookedAt looked_at(field, offset);
+    const Eigen::Array3i& cells = looked_at.cells;
+    std::vector<std::array<double, 2>> squares(looked_at.count, {0.0, 0.0});
     const double lit_radius =
         settings.lit_radius > 0.0 ? settings.lit_radius + 0.5 * std::hypot(field.step[0], field.step[1]) : INFINITY;
-    tbb::parallel_for(0, looked_at, [&](int number) {
-      const int cell = number * stride;
+    tbb::parallel_for(0, looked_at.count, [&](int number) {
+      const int cell = number * looked_at.stride;
       const Eigen::Vector3d at = place(field, cell % cells[0] + offset[0], cell / cells[0] % cells[1] + offset[1],
                                        cell / (cells[0] * cells[1]) + offset[2]);
       if (at.head<2>().norm() > lit_radius) return;
@@ -256,6 +264,16 @@ struct Maker {
       whole += t;
     }
     return whole > 0.0 ? std::sqrt(wrong / whole) : 0.0;
+  }
+  /// Errors along each axis.
+  Eigen::Array3d axis_errors(const LightField& field) const {
+    Eigen::Array3d errors;
+    for (int axis = 0; axis < 3; ++axis) {
+      Eigen::Array3d offset = Eigen::Array3d::Zero();
+      offset[axis] = 0.5;
+      errors[axis] = error(field, offset);
+    }
+    return errors;
   }
 };
 
@@ -366,8 +384,10 @@ UprightWalls walls_round_sheet(const Scene& rest, const Eigen::AlignedBox3d& rea
   return hide && within ? walls : UprightWalls{};
 }
 
-LightField make_light_field(const Scene& fixture, const Eigen::AlignedBox3d& reach,
-                            const LightFieldSettings& settings) {
+namespace {
+
+/// A field without its grid: box, layer and walls, once they are found sound.
+LightField field_over(const Scene& fixture, const Eigen::AlignedBox3d& reach, const LightFieldSettings& settings) {
   LightField field;
   field.fixture = fixture;
   field.fixture.surfaces.clear();
@@ -381,47 +401,106 @@ LightField make_light_field(const Scene& fixture, const Eigen::AlignedBox3d& rea
   // By the box's middle, since it may end just on a face.
   const double middle = reach.center().z();
   for (const FlatFace& face : fixture.faces) field.layer += face.z < middle ? 1 : 0;
+  return field;
+}
 
-  Maker maker{settings, PreparedScene<1>(single_band(fixture, -1)), {}, {}};
-  field.index = maker.clear.media[maker.clear.medium_of_layer(field.layer)].index;
-  const bool absorbs = std::any_of(fixture.media.begin(), fixture.media.end(), [](const Medium& medium) {
-    return medium.absorption.size() > 0 && (medium.absorption > 0.0).any();
-  });
-  if (absorbs) {
-    for (int band = 0; band < fixture.environment.size(); ++band) {
-      maker.absorbing.push_back(std::make_unique<PreparedScene<1>>(single_band(fixture, band)));
+/// That with its beams, what fills it, and the cells to begin with: about as long as wide, some eight along the longest
+/// side.
+struct BegunField {
+  LightField field;
+  Maker maker;
+  Eigen::Array3i cells;
+
+  BegunField(const Scene& fixture, const Eigen::AlignedBox3d& reach, const LightFieldSettings& settings)
+      : field(field_over(fixture, reach, settings)),
+        maker{settings, PreparedScene<1>(single_band(fixture, -1)), {}, {}},
+        cells((reach.sizes().array() / (reach.sizes().maxCoeff() / 8.0)).ceil().cast<int>().max(1)) {
+    field.index = maker.clear.media[maker.clear.medium_of_layer(field.layer)].index;
+    const bool absorbs = std::any_of(fixture.media.begin(), fixture.media.end(), [](const Medium& medium) {
+      return medium.absorption.size() > 0 && (medium.absorption > 0.0).any();
+    });
+    if (absorbs) {
+      for (int band = 0; band < fixture.environment.size(); ++band) {
+        maker.absorbing.push_back(std::make_unique<PreparedScene<1>>(single_band(fixture, band)));
+      }
     }
+    maker.choose_beams(field);
   }
+};
 
-  maker.choose_beams(field);
+/// Puts a grid of `cells` over the field's box. @returns its nodes, or nothing where they are too many
+std::optional<double> take_grid(const Eigen::Array3i& cells, const LightFieldSettings& settings, LightField& field) {
+  field.nodes = cells + 1;
+  field.step = field.reach.sizes().array() / cells.cast<double>();
+  const double nodes = field.nodes.cast<double>().prod();
+  if (nodes > kMostNodes || nodes * field.beam_count() > settings.most_flows) return std::nullopt;
+  return nodes;
+}
 
-  // Cells about as long as wide to begin with, some eight along the longest side.
-  const Eigen::Array3d size = reach.sizes().array();
-  Eigen::Array3i cells = (size / (size.maxCoeff() / 8.0)).ceil().cast<int>().max(1);
+/// The first of the largest.
+int worst_axis(const Eigen::Array3d& errors) {
+  int worst = 0;
+  for (int axis = 1; axis < 3; ++axis) worst = errors[axis] > errors[worst] ? axis : worst;
+  return worst;
+}
+
+}  // namespace
+
+LightField make_light_field(const Scene& fixture, const Eigen::AlignedBox3d& reach,
+                            const LightFieldSettings& settings) {
+  BegunField begun(fixture, reach, settings);
+  LightField& field = begun.field;
+  const Maker& maker = begun.maker;
+  Eigen::Array3i& cells = begun.cells;
   for (int halved = -1;;) {
-    field.nodes = cells + 1;
-    field.step = size / cells.cast<double>();
-    const double nodes = field.nodes.cast<double>().prod();
-    if (nodes > kMostNodes || nodes * field.beam_count() > settings.most_flows) {
+    if (!take_grid(cells, settings, field)) {
       fail(
           "light field: accuracy {} needs {} nodes or more of {} beams; {} nodes and {} of both are allowed (the last "
           "grid's error is {:.2g}; a lobe's rim that crosses the box needs a wider soft_angle)",
-          settings.accuracy, nodes, field.beam_count(), kMostNodes, settings.most_flows, field.error);
+          settings.accuracy, field.nodes.cast<double>().prod(), field.beam_count(), kMostNodes, settings.most_flows,
+          field.error);
     }
     maker.fill(field, halved);
     field.error = maker.error(field, Eigen::Array3d::Constant(0.5));
-    if (field.error <= settings.accuracy) return field;
-    double most = -1.0;
-    for (int axis = 0; axis < 3; ++axis) {
-      Eigen::Array3d offset = Eigen::Array3d::Zero();
-      offset[axis] = 0.5;
-      const double error = maker.error(field, offset);
-      if (error > most) {
-        most = error;
-        halved = axis;
-      }
-    }
+    if (field.error <= settings.accuracy) return std::move(field);
+    halved = worst_axis(maker.axis_errors(field));
     cells[halved] *= 2;
+  }
+}
+
+LightFieldCount count_light_field(const Scene& fixture, const Eigen::AlignedBox3d& reach,
+                                  const LightFieldSettings& settings) {
+  constexpr double kMostFilled = 12000.0;
+  BegunField begun(fixture, reach, settings);
+  LightField& field = begun.field;
+  const Maker& maker = begun.maker;
+  const double a_node = 1.0 + static_cast<double>(maker.absorbing.size());
+  LightFieldCount count;
+  double known = 0.0;
+  Eigen::Array3d along = Eigen::Array3d::Zero();
+  double together = 1.0;  // the error in the cells' middles over the sum of those along the axes
+  for (int halved = -1;;) {
+    const std::optional<double> nodes = take_grid(begun.cells, settings, field);
+    if (!nodes) return count;
+    double work = a_node * (*nodes - known) + Maker::LookedAt(field, Eigen::Array3d::Constant(0.5)).count;
+    for (int axis = 0; axis < 3; ++axis)
+      work += Maker::LookedAt(field, 0.5 * Eigen::Vector3d::Unit(axis).array()).count;
+    count.places += work;
+    known = *nodes;
+    if (known <= kMostFilled) {
+      maker.fill(field, halved);
+      field.error = maker.error(field, Eigen::Array3d::Constant(0.5));
+      along = maker.axis_errors(field);
+      together = field.error / std::max(1e-300, along.sum());
+      count.looked_at += work;
+    } else {
+      along[halved] *= 0.25;  // of second order in the step
+      field.error = together * along.sum();
+    }
+    count.fits = field.error <= settings.accuracy;
+    if (count.fits) return count;
+    halved = worst_axis(along);
+    begun.cells[halved] *= 2;
   }
 }
 

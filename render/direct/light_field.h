@@ -75,6 +75,19 @@ UprightWalls walls_round_sheet(const Scene& rest, const Eigen::AlignedBox3d& rea
 LightField make_light_field(const Scene& fixture, const Eigen::AlignedBox3d& reach,
                             const LightFieldSettings& settings = {});
 
+/// What making a field takes, in places at which the light of all lamps is computed.
+struct LightFieldCount {
+  double places = 0.0;     ///< of the field; those with absorption count once more a band
+  double looked_at = 0.0;  ///< by count_light_field itself: its seconds over this are those of a place
+  bool fits = false;       ///< false: make_light_field will fail, after so many
+};
+
+/// Counts what make_light_field would do with the same arguments: makes its first grids, and takes the error of finer
+/// ones to fall with the square of the step. Where that is near the accuracy it may stop a grid earlier or later.
+/// @throws Error as that
+LightFieldCount count_light_field(const Scene& fixture, const Eigen::AlignedBox3d& reach,
+                                  const LightFieldSettings& settings = {});
+
 /// F of one lamp, all its beams together, at `place` by connections to its lens, as the grid's nodes have it: F and its
 /// length. For tests and for error estimates. @pre settings as of make_light_field
 Eigen::Vector4d exact_flow(const LightField& field, int lamp, const Eigen::Vector3d& place,

@@ -29,7 +29,18 @@ double pixels_per_mm(const Camera& camera, const Scene& rest) {
       camera);
 }
 
+/// Standard deviation that the light is smoothed with.
+double smoothing_px(const Scene& rest, const Camera& camera, const RestLightSettings& settings) {
+  return settings.smooth_mm * pixels_per_mm(camera, rest);
+}
+
 }  // namespace
+
+int rest_light_samples(const Scene& rest, const Camera& camera, const RestLightSettings& settings) {
+  const double sigma = smoothing_px(rest, camera, settings);
+  const double window = std::max(1.0, 4.0 * kPi * sigma * sigma);  // as many pixels a Gaussian's mean is as good as
+  return std::min(settings.samples, static_cast<int>(std::ceil(settings.paths / window)));
+}
 
 cv::Mat measure_rest_light(DirectRenderer& renderer, const Scene& rest, const Camera& camera,
                            const RestLightSettings& settings) {
@@ -55,12 +66,10 @@ cv::Mat measure_rest_light(DirectRenderer& renderer, const Scene& rest, const Ca
   cv::Mat response = renderer.render(direct).irradiance - plain;
   renderer.set_bounced_light({});
 
-  const double sigma = settings.smooth_mm * pixels_per_mm(camera, rest);
-  const double window = std::max(1.0, 4.0 * kPi * sigma * sigma);  // as many pixels a Gaussian's mean is as good as
+  const double sigma = smoothing_px(rest, camera, settings);
   RenderSettings paths;
   paths.seed = settings.seed;
-  paths.min_samples = paths.max_samples =
-      std::min(settings.samples, static_cast<int>(std::ceil(settings.paths / window)));
+  paths.min_samples = paths.max_samples = rest_light_samples(rest, camera, settings);
   paths.max_depth = settings.max_depth;
   cv::Mat added = Tracer(whole).render(camera, paths).irradiance - plain;
 

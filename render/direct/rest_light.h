@@ -36,4 +36,7 @@ struct RestLightSettings {
 cv::Mat measure_rest_light(DirectRenderer& renderer, const Scene& rest, const Camera& camera,
                            const RestLightSettings& settings = {});
 
+/// Paths a pixel that it takes, with the same arguments.
+int rest_light_samples(const Scene& rest, const Camera& camera, const RestLightSettings& settings = {});
+
 }  // namespace touchstone::render

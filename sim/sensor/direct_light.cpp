@@ -82,6 +82,45 @@ std::string with_figures(const std::string& verdict, const render::DirectError& 
 
 }  // namespace
 
+namespace {
+
+/// What choose_direct chooses for.
+struct AskedLight {
+  render::Scene rest, pressed;
+  Eigen::AlignedBox3d reach;
+  render::DirectChoiceSettings settings;
+
+  AskedLight(const SceneView& view, std::span<const Truth> truths)
+      : rest(for_direct_light(view.seen(at_rest(truths.front().press), {}))) {
+    const Truth& judged = deepest(truths);
+    pressed = for_direct_light(view.seen(judged.press, view.relief(judged.press)));
+    reach = reach_of(rest, pressed, truths, -view.scene.device.gel.thickness_mm);
+    settings.tolerance = view.scene.light.direct_tolerance;
+    settings.direct.seed = settings.error.seed = settings.rest.seed = view.scene.seed;
+    settings.error.samples = kPathsToMeasure;
+    settings.lit_radius = lit_radius(view.scene.device.gel, reach);
+  }
+};
+
+}  // namespace
+
+DirectWork count_direct_work(const SceneView& view, const render::Camera& camera, std::span<const Truth> truths) {
+  TS_ASSERT(view.plan.direct_light && !truths.empty());
+  const AskedLight asked(view, truths);
+  DirectWork work;
+  render::Scene direct = asked.rest;
+  direct.interreflection = false;
+  work.field = render::count_light_field(direct, asked.reach,
+                                         render::light_field_settings(asked.rest, asked.reach, asked.settings));
+  if (asked.rest.interreflection) {
+    const Eigen::Vector2i size = render::size_of(camera);
+    work.rest_paths =
+        static_cast<double>(render::rest_light_samples(asked.rest, camera, asked.settings.rest)) * size.x() * size.y();
+  }
+  work.error_paths = 2.0 * asked.settings.error.pixels * asked.settings.error.samples;
+  return work;
+}
+
 DirectLight::DirectLight(const SceneView& view, const render::Camera& camera, std::span<const Truth> truths,
                          std::span<const int> rays_tried, int edge_side, const render::GuideCut& guides,
                          double field_accuracy)
@@ -89,24 +128,16 @@ DirectLight::DirectLight(const SceneView& view, const render::Camera& camera, st
   TS_ASSERT(view.plan.direct_light && !truths.empty() && !rays_tried.empty());
   const SceneSpec& scene = view.scene;
   const bool forced = scene.effects.direct_light == Switch::on;
-  const fem::PressState still = at_rest(truths.front().press);
-  const render::Scene rest = for_direct_light(view.seen(still, {}));
-  const Truth& judged = deepest(truths);
-  const render::Scene pressed = for_direct_light(view.seen(judged.press, view.relief(judged.press)));
-  render::DirectChoiceSettings settings;
-  settings.tolerance = scene.light.direct_tolerance;
+  AskedLight asked(view, truths);
+  render::DirectChoiceSettings& settings = asked.settings;
   settings.direct.edge_side = edge_side;
   settings.guides = guides;
   settings.field_accuracy = field_accuracy;
-  settings.direct.seed = settings.error.seed = settings.rest.seed = scene.seed;
-  settings.error.samples = kPathsToMeasure;
-  const Eigen::AlignedBox3d reach = reach_of(rest, pressed, truths, -scene.device.gel.thickness_mm);
-  settings.lit_radius = lit_radius(scene.device.gel, reach);
   render::DirectChoice chosen;
   for (const int rays : rays_tried) {
     settings.direct.samples = rays;
     settings.whatever = forced && rays == rays_tried.back();
-    chosen = render::choose_direct(rest, pressed, camera, reach, settings);
+    chosen = render::choose_direct(asked.rest, asked.pressed, camera, asked.reach, settings);
     if (chosen.renderer || chosen.error.pixels == 0) break;
   }
   if (chosen.error.pixels > 0) choice_.error = chosen.error;
@@ -122,7 +153,7 @@ DirectLight::DirectLight(const SceneView& view, const render::Camera& camera, st
   choice_.reason =
       with_figures(rays == 1 ? "direct light" : fmt::format("direct light of {} rays a pixel", rays), chosen.error);
   settings_ = settings.direct;
-  rest_ = rest;
+  rest_ = asked.rest;
   rest_.interreflection = false;
   field_ = std::move(chosen.field);
   bounced_ = chosen.bounced;

@@ -26,6 +26,16 @@ struct FoundLight {
   cv::Mat bounced;
 };
 
+/// What trying direct light takes with each number of rays, but for the picture itself.
+struct DirectWork {
+  render::LightFieldCount field;
+  double rest_paths = 0.0;   ///< traced for the bounced light of the gel at rest
+  double error_paths = 0.0;  ///< traced to measure its error; four times as many where that leaves it open
+};
+
+/// Counts it. @pre as DirectLight. @throws Error where a light field can't be had
+DirectWork count_direct_work(const SceneView& view, const render::Camera& camera, std::span<const Truth> truths);
+
 /// Tier 1 of the renderers for one scene. Made once; `render` is pure and may be called from several threads.
 class DirectLight {
  public:

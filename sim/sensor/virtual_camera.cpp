@@ -21,6 +21,7 @@
 #include "sim/sensor/colour_numbers.h"
 #include "sim/sensor/direct_light.h"
 #include "sim/sensor/key_frames.h"
+#include "sim/sensor/picture_settings.h"
 #include "sim/sensor/residual_light.h"
 #include "sim/view/pixel_truth.h"
 #include "sim/view/scene_view.h"
@@ -28,28 +29,7 @@
 namespace touchstone::sim {
 namespace {
 
-// The light of key frames stays in other frames where nothing changes, so it is rendered better than theirs.
-constexpr double kKeyFrameFraction = 0.5;
-constexpr int kFirstFrameSamples = 4;
-// After the first frame, which stands for the gel at rest, one frame in so many is a key: 2 or 3 % more work, which
-// pays where frames are so dense that those next to each other are alike. Where a key needs the most samples there are
-// edges, which other frames don't have in the same place: it gets no more of them than they do.
-constexpr std::size_t kFramesPerKey = 50;
 constexpr int kMeteringSamples = 8;  // a pixel, of a picture that is only metered: the mean of 10^5 pixels has 1e-3
-
-/// The electrons of all channels together, as many as the one that sees most: a lamp of one colour counts even if the
-/// first samples of a pixel never chose it.
-render::NoiseTarget noise_target(const render::ImagerResponse& response, double fraction) {
-  const render::QuantumEfficiency& channels = response.electrons_per_irradiance;
-  render::NoiseTarget target;
-  target.electrons_per_irradiance = channels.colwise().sum().transpose().array();
-  const double all = target.electrons_per_irradiance.sum();
-  if (all > 0.0) target.electrons_per_irradiance *= channels.rowwise().sum().maxCoeff() / all;
-  target.read_noise_e = response.read_noise_e;
-  target.quantisation_e = response.quantisation_e / std::sqrt(12.0);
-  target.fraction = fraction;
-  return target;
-}
 
 }  // namespace
 
@@ -64,10 +44,7 @@ struct VirtualCamera::Parts : SceneView {
         ideal_imager(sim::imager(scene.device, plan.bands, false)),
         response(render::response_of(imager)),
         pattern(render::fixed_pattern(imager, size, scene.seed)) {
-    settings.seed = scene.seed;
-    settings.min_samples = scene.light.min_samples;
-    settings.max_samples = scene.light.max_samples;
-    settings.noise = noise_target(response, scene.light.noise_fraction);
+    settings = picture_settings(scene, response);
     if (scene.device.residual) lacking.emplace(*scene.device.residual, ideal_imager);
   }
 
@@ -97,10 +74,7 @@ struct VirtualCamera::Parts : SceneView {
     if (direct) {
       if (const auto image = direct->render(rest)) return image->irradiance;
     }
-    render::RenderSettings well = settings;
-    well.noise = noise_target(response, kKeyFrameFraction * scene.light.noise_fraction);
-    well.max_samples *= kFirstFrameSamples;
-    return render::Tracer(rest).render(camera, well).irradiance;
+    return render::Tracer(rest).render(camera, key_frame_settings(scene, response, true)).irradiance;
   }
 
   /// Light with what the device's background and residual map add to it, if it has one.
@@ -157,10 +131,8 @@ struct VirtualCamera::Parts : SceneView {
     KnownLight light = keys.empty() ? nothing_known() : known(truth.t_us, {&key.appearance, 1});
     key.where = keys.empty() ? cv::Rect({0, 0}, size) : cv::boundingRect(light.missing);
     if (key.where.empty()) return key;
-    render::RenderSettings well = settings;
-    well.noise = noise_target(response, kKeyFrameFraction * scene.light.noise_fraction);
-    if (keys.empty()) well.max_samples *= kFirstFrameSamples;
-    const render::RenderedImage image = at_once.render(camera, well, light.missing);
+    const render::RenderedImage image =
+        at_once.render(camera, key_frame_settings(scene, response, keys.empty()), light.missing);
     add_traced(image.irradiance, image.standard_error, light);
     key.irradiance = light.irradiance(key.where).clone();
     key.standard_error = light.standard_error(key.where).clone();

@@ -48,7 +48,7 @@ TEST(PlanCommand, PlansEachShippedFileThatSaysWhatWillBeSimulated) {
   for (const char* folder : {"jobs", "studies", "chroma", "gelsight", "vhs"}) {
     for (const fs::path& file : yaml_files_in(kScenes / folder)) {
       if (file == device_beside_studies) continue;
-      const ProgramRun run = run_program({"--quiet", "plan", file.string()});
+      const ProgramRun run = run_program({"--quiet", "plan", "--no-seconds", file.string()});
       EXPECT_EQ(run.exit_code, 0) << file << ": " << run.err;
       EXPECT_EQ(run.err, "") << file;
       EXPECT_THAT(run.out, AllOf(HasSubstr("gel mechanics"), HasSubstr("camera and renderer"), HasSubstr("gel: ")))
@@ -83,10 +83,40 @@ TEST(PlanCommand, SaysWhyItRefusesEachOtherShippedFile) {
                 "it is a fit's file; `touchstone fit`");
 }
 
+TEST(PlanCommand, PrintsSecondsOfThisMachine) {
+  const test::TemporaryFolder folder;
+  test::write_small_job(folder);
+  const std::string scene = (folder.path() / "scene.yaml").string();
+  const std::vector<std::string> words = {"--quiet", "--threads", "1", "--cache", (folder.path() / "cache").string()};
+  const auto plan = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> all = words;
+    all.insert(all.end(), more.begin(), more.end());
+    return run_program(all);
+  };
+  const ProgramRun first = plan({"plan", scene});
+  ASSERT_EQ(first.exit_code, 0) << first.err;
+  EXPECT_THAT(first.out, AllOf(HasSubstr("a frame  why (cost)"), HasSubstr("\non 1 thread of this machine: about "),
+                               HasSubstr(" set-up, "), HasSubstr(" frames at "),
+                               HasSubstr("not known: what is pressed: the gel isn't set up yet")));
+  const auto rates = [&] {
+    int count = 0;
+    for (const auto& entry : fs::directory_iterator(folder.path() / "cache")) {
+      count += entry.path().filename().string().starts_with("rates-");
+    }
+    return count;
+  };
+  EXPECT_EQ(rates(), 1);
+  const ProgramRun none = plan({"plan", "--no-seconds", scene});
+  EXPECT_THAT(none.out, AllOf(HasSubstr("on   why (cost)"), Not(HasSubstr("of this machine"))));
+  const ProgramRun job = plan({"plan", (folder.path() / "job.yaml").string()});
+  EXPECT_THAT(job.out, HasSubstr(" of this machine: about "));
+  EXPECT_EQ(rates(), 1) << "measured once";
+}
+
 TEST(PlanCommand, OfAJobThatDrawsPlansEachObject) {
   const test::TemporaryFolder folder;
   const fs::path job = test::write_small_draw(folder);
-  const ProgramRun run = run_program({"plan", job.string()});
+  const ProgramRun run = run_program({"plan", "--no-seconds", job.string()});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, HasSubstr("job small-draw: draws 10 samples; units: 2, objects: 2, files: 4\n"));
   EXPECT_THAT(run.out, AllOf(HasSubstr("\nball (sample "), HasSubstr("\npunch (sample ")));
@@ -96,7 +126,7 @@ TEST(PlanCommand, OfAJobThatDrawsPlansEachObject) {
                              HasSubstr("truth of pixels         yes")));
   std::string text = read_whole_file(job);
   text.replace(text.find("outputs: [frame, height, contact]"), 33, "outputs: []");
-  const ProgramRun unseen = run_program({"plan", folder.write("unseen.yaml", text).string()});
+  const ProgramRun unseen = run_program({"plan", "--no-seconds", folder.write("unseen.yaml", text).string()});
   ASSERT_EQ(unseen.exit_code, 0) << unseen.err;
   EXPECT_THAT(unseen.out, HasSubstr("no image is asked for: truth alone needs none"));
 }
@@ -114,13 +144,13 @@ TEST(PlanCommand, OfAJobThatDrawsTakesDevicesWithoutACameraAndMilkyOnes) {
   put("device: device.yaml", "device: blind.yaml");
   put("      - {path: 'lamps[*].power_W', times: {uniform: [0.9, 1.1]}}\n", "");
   put("outputs: [frame, height, contact]", "outputs: [traction]");
-  const ProgramRun run = run_program({"plan", folder.write("blind-job.yaml", text).string()});
+  const ProgramRun run = run_program({"plan", "--no-seconds", folder.write("blind-job.yaml", text).string()});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, HasSubstr("no image is asked for: truth alone needs none"));
   EXPECT_THAT(run.out, Not(HasSubstr("milky")));
   put("device: blind.yaml", "device: " + (kScenes / "devices" / "dvs-grasp.yaml").string());
   put("outputs: [traction]", "outputs: [frame, events]");
-  const ProgramRun milky = run_program({"plan", folder.write("milky-job.yaml", text).string()});
+  const ProgramRun milky = run_program({"plan", "--no-seconds", folder.write("milky-job.yaml", text).string()});
   ASSERT_EQ(milky.exit_code, 0) << milky.err;
   EXPECT_THAT(milky.out, HasSubstr("Pictures are made from maps of what touches the milky gel"));
 }

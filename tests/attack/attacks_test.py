@@ -44,7 +44,7 @@ class Attack(unittest.TestCase):
 class FoldersOfSetUpResults(Attack):
     def plan(self, *words, **environment):
         environment = {name: str(value) for name, value in environment.items()}
-        return self.run_program(*words, "plan", self.scenes / "beads-scene.yaml", environment=environment)
+        return self.run_program(*words, "plan", "--no-seconds", self.scenes / "beads-scene.yaml", environment=environment)
 
     def own(self):
         """HOME's folder of set-up results, of mode 0700."""
@@ -120,7 +120,7 @@ class ClosedDescriptors(Attack):
 class FullOutput(Attack):
     def test_a_full_stdout_is_said(self):
         with open("/dev/full", "w") as full:
-            for words in (["--version"], ["schema", "device"], ["plan", self.scenes / "beads-scene.yaml"]):
+            for words in (["--version"], ["schema", "device"], ["plan", "--no-seconds", self.scenes / "beads-scene.yaml"]):
                 run = self.run_program(*words, stdout=full)
                 self.assertEqual(run.returncode, 1, words)
                 self.assertIn("touchstone: stdout: ", run.stderr)
@@ -202,7 +202,7 @@ class Refusals(Attack):
         (self.scenes / name).write_text(text.replace(old, new))
 
     def plan(self, scene="beads-scene.yaml"):
-        return self.run_program("plan", self.scenes / scene)
+        return self.run_program("plan", "--no-seconds", self.scenes / scene)
 
     def test_a_pixel_that_holds_no_electron(self):
         self.change("beads-device.yaml", "full_well_e: 50000", "full_well_e: 1e-300")

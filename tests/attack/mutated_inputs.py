@@ -48,12 +48,12 @@ def yaml_cases(folder, source):
     for part in ("studies", "devices", "objects", "motions", "spectra", "vhs", "jobs"):
         shutil.copytree(source / "scenes" / part, folder / "scenes" / part)
     scene = ["beads-scene.yaml", "beads-device.yaml", "beads-motion.yaml", "probe.yaml"]
-    yield Case("scene", jobs, scene, ["plan", jobs / "beads-scene.yaml"])
-    yield Case("job of scenes", jobs, ["beads.yaml"], ["plan", jobs / "beads.yaml"], scene)
-    yield Case("job that draws", jobs, ["draw.yaml", "coated-device.yaml"], ["plan", jobs / "draw.yaml"],
+    yield Case("scene", jobs, scene, ["plan", "--no-seconds", jobs / "beads-scene.yaml"])
+    yield Case("job of scenes", jobs, ["beads.yaml"], ["plan", "--no-seconds", jobs / "beads.yaml"], scene)
+    yield Case("job that draws", jobs, ["draw.yaml", "coated-device.yaml"], ["plan", "--no-seconds", jobs / "draw.yaml"],
                ["ball-4mm.yaml", "cylinder-8.5mm.yaml", "coin-penny.yaml"])
     studies = folder / "scenes/studies"
-    yield Case("study", studies, ["vhs-thickness-spacing.yaml"], ["plan", studies / "vhs-thickness-spacing.yaml"],
+    yield Case("study", studies, ["vhs-thickness-spacing.yaml"], ["plan", "--no-seconds", studies / "vhs-thickness-spacing.yaml"],
                [path.name for path in (folder / "scenes/vhs").iterdir()])
     (jobs / "fit.yaml").write_text(
         "name: unit\ndevice: coated-device.yaml\nunknowns:\n  - {path: 'lamps[0].power_W[0]', times: [0.5, 2]}\n"
@@ -70,7 +70,7 @@ def mesh_cases(folder, source):
         (jobs / f"{stem}.yaml").write_text(f"name: body\nshape: {{type: mesh, file: {mesh.name}}}\nradiance: 1\n")
         text = (source / "tests/jobs/beads-scene.yaml").read_text().replace("probe.yaml", f"{stem}.yaml")
         (jobs / f"{stem}-scene.yaml").write_text(text)
-        yield Case(f"mesh {mesh.name}", jobs, [mesh.name], ["plan", jobs / f"{stem}-scene.yaml"],
+        yield Case(f"mesh {mesh.name}", jobs, [mesh.name], ["plan", "--no-seconds", jobs / f"{stem}-scene.yaml"],
                    [f"{stem}.yaml", f"{stem}-scene.yaml"])
 
 

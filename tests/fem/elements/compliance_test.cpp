@@ -65,6 +65,19 @@ TEST(Compliance, IsSymmetricPositiveDefinite) {
   }
 }
 
+TEST(Compliance, ItsEliminationIsCountedBeforehand) {
+  const ElasticMaterial material = kSoft;
+  const std::vector<Bead> beads = two_beads();
+  const Compliance gel = compute_compliance(small_mesh(), material, beads, 1.0);
+  const EliminationCount count = count_elimination(small_mesh(), std::span(&material, 1), beads);
+  EXPECT_EQ(count.unknowns, gel.report.unknowns);
+  EXPECT_EQ(count.border, 3.0 * static_cast<double>(gel.vertices.size() + beads.size()));
+  EXPECT_EQ(count.operations, gel.report.operations);
+  const double inside = count_factorisation(small_mesh(), std::span(&material, 1));
+  EXPECT_GT(inside, 0.0);
+  EXPECT_LT(inside, count.operations);
+}
+
 TEST(Compliance, SchurComplementEqualsASolveOfTheLoad) {
   const TetMesh mesh = small_mesh();
   const TaylorHoodSpace space = make_space(mesh);

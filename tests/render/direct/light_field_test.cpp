@@ -49,6 +49,28 @@ TEST(LightField, ErrorFallsWithTheGrid) {
   EXPECT_GT(fine.nodes.prod(), coarse.nodes.prod());
 }
 
+TEST(LightField, IsCountedFromSomeOfItsPlaces) {
+  const Scene scene = lit_stack(0.0);
+  const LightFieldCount coarse = count_light_field(scene, reach_of_membrane(), accuracy(1e-2));
+  const LightField field = make_light_field(scene, reach_of_membrane(), accuracy(5e-4));
+  const LightFieldCount fine = count_light_field(scene, reach_of_membrane(), accuracy(5e-4));
+  EXPECT_TRUE(coarse.fits && fine.fits);
+  EXPECT_GT(fine.places, coarse.places);
+  // Its nodes, a grid more or less, and the places of each grid where its error is judged.
+  EXPECT_GE(fine.places, 0.5 * field.nodes.prod());
+  EXPECT_LE(fine.places, 2.0 * field.nodes.prod() + 4e3 * 20.0);
+  EXPECT_LE(fine.looked_at, fine.places);
+  const LightFieldCount finest = count_light_field(scene, reach_of_membrane(), accuracy(5e-5));
+  EXPECT_LT(finest.looked_at, finest.places) << "the finest grids are counted without being made";
+  Scene absorbing = scene;
+  for (Medium& medium : absorbing.media) medium.absorption = flat_spectrum(scene.environment.size(), 0.1);
+  const LightFieldCount dim = count_light_field(absorbing, reach_of_membrane(), accuracy(5e-4));
+  EXPECT_GT(dim.places, fine.places + 0.5 * field.nodes.prod()) << "each band's absorption is computed, too";
+  LightFieldSettings few = accuracy(1e-4);
+  few.most_flows = 5000;
+  EXPECT_FALSE(count_light_field(scene, reach_of_membrane(), few).fits);
+}
+
 TEST(LightField, RefusesWhatItCannotHold) {
   const Scene scene = lit_stack(0.0);
   const Eigen::AlignedBox3d reach = reach_of_membrane();
