@@ -16,8 +16,9 @@
 namespace touchstone::fem {
 namespace {
 
-constexpr double kLargestPart = 0.1;  // of the thickness: the motion in one part
-constexpr double kFirstTouch = 0.02;  // of the thickness: where a force-controlled press begins
+constexpr double kLargestPart = 0.1;    // of the thickness: the motion in one part
+constexpr double kFirstTouch = 0.02;    // of the thickness: where a force-controlled press begins
+constexpr double kDeepestTouch = 0.16;  // at most, where nothing touches before
 
 struct Effort {
   PartEffort part;
@@ -182,14 +183,19 @@ FiniteSnapshot FinitePress::Parts::follow(const PressTarget& target, Effort& eff
   }
   if (!to.forced[2]) refuse_too_deep(to.pose);
   if (to.forced[2] && !start.touching) {
-    // A little by position first: a force has nothing to act on yet.
-    PartTarget first;
-    first.pose = to.pose;
-    first.pose.translation.z() -= kFirstTouch * gel.thickness;
-    auto begun = advance(start, first, start, 0.0, 1.0, tolerance.most_halvings, effort);
-    if (!begun) fail_to_converge(effort);
-    if (!begun->touching) fail("the press doesn't converge: no vertex touches");
-    start = std::move(*begun);
+    // A little by position first: a force has nothing to act on yet. A body smaller than an edge may have to go deeper
+    // until a vertex meets it.
+    for (double depth = kFirstTouch; !start.touching; depth *= 2.0) {
+      if (depth > kDeepestTouch) {
+        fail("the press doesn't converge: no vertex touches within {:.3g} mm", kDeepestTouch * gel.thickness);
+      }
+      PartTarget first;
+      first.pose = to.pose;
+      first.pose.translation.z() -= depth * gel.thickness;
+      auto begun = advance(start, first, start, 0.0, 1.0, tolerance.most_halvings, effort);
+      if (!begun) fail_to_converge(effort);
+      start = std::move(*begun);
+    }
   }
 
   double parts = 1.0;
