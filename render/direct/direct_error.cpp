@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 #include <vector>
 
 #include "core/error.h"
@@ -104,20 +106,47 @@ DirectError direct_error_beside(const std::array<cv::Mat, 2>& traced, const cv::
   return error;
 }
 
+namespace {
+
+/// A scene's pixels by paths, traced when first asked for: pictures of several renderers stand beside them.
+class Reference {
+ public:
+  Reference(const Scene& scene, const Camera& camera, const DirectErrorSettings& settings)
+      : scene_(scene), camera_(camera), settings_(settings) {
+    if (settings.pixels < 2 || settings.samples < 1) {
+      fail("direct error: {} pixels of {} samples; at least 2 and 1 are needed", settings.pixels, settings.samples);
+    }
+    mask_ = spread_pixels(size_of(camera), settings.pixels, settings.seed);
+  }
+
+  /// Beside so many times the paths of the settings.
+  DirectError error_of(const cv::Mat& picture, int times) {
+    std::array<cv::Mat, 2>& traced = traced_[times];
+    if (traced[0].empty()) {
+      traced = trace_twice(scene_, camera_, mask_, times * settings_.samples, settings_.max_depth, settings_.seed);
+    }
+    return direct_error_beside(traced, picture, mask_);
+  }
+
+ private:
+  const Scene& scene_;
+  const Camera& camera_;
+  DirectErrorSettings settings_;
+  cv::Mat mask_;
+  std::map<int, std::array<cv::Mat, 2>> traced_;
+};
+
+}  // namespace
+
 DirectError measure_direct_error(const cv::Mat& picture, const Scene& scene, const Camera& camera,
                                  const DirectErrorSettings& settings) {
   const auto bands = static_cast<int>(scene.environment.size());
   const Eigen::Vector2i size = size_of(camera);
-  if (settings.pixels < 2 || settings.samples < 1) {
-    fail("direct error: {} pixels of {} samples; at least 2 and 1 are needed", settings.pixels, settings.samples);
-  }
   if (picture.type() != CV_32FC(bands) || picture.cols != size.x() || picture.rows != size.y()) {
     fail("direct error: the picture has {} x {} pixels of {} channels; the camera has {} x {} of {} (32-bit floats)",
          picture.cols, picture.rows, picture.channels(), size.x(), size.y(), bands);
   }
-  const cv::Mat mask = spread_pixels(size, settings.pixels, settings.seed);
-  const auto traced = trace_twice(scene, camera, mask, settings.samples, settings.max_depth, settings.seed);
-  return direct_error_beside(traced, picture, mask);
+  return Reference(scene, camera, settings).error_of(picture, 1);
 }
 
 LightFieldSettings light_field_settings(const Scene& rest, const Eigen::AlignedBox3d& reach,
@@ -159,26 +188,37 @@ DirectChoice choose_direct(const Scene& rest, const Scene& first, const Camera& 
     choice.reason = unfit_for_direct(field, asked);
     if (!choice.reason.empty()) return choice;
   }
-  auto renderer = std::make_unique<DirectRenderer>(field, camera, direct, settings.direct);
-  if (rest.interreflection) {
-    choice.bounced = measure_rest_light(*renderer, rest, camera, settings.rest);
-    renderer->set_bounced_light(choice.bounced, rest);
-  }
-  const cv::Mat picture = renderer->render(first).irradiance;
-  choice.error = measure_direct_error(picture, first, camera, settings.error);
-  if (largest_rms(choice.error) > settings.tolerance && smallest_rms(choice.error) < settings.tolerance &&
-      !settings.whatever) {
-    DirectErrorSettings more = settings.error;
-    more.samples *= kMorePaths;
-    choice.error = measure_direct_error(picture, first, camera, more);
+  std::vector<int> tried = settings.samples;
+  if (tried.empty()) tried.push_back(settings.direct.samples);
+  Reference reference(first, camera, settings.error);
+  cv::Mat traced_rest;
+  std::unique_ptr<DirectRenderer> renderer;
+  for (const int samples : tried) {
+    DirectSettings drawing = settings.direct;
+    drawing.samples = choice.samples = samples;
+    const bool whatever = settings.whatever && samples == tried.back();
+    renderer = std::make_unique<DirectRenderer>(field, camera, direct, drawing);
+    if (rest.interreflection) {
+      if (traced_rest.empty()) traced_rest = trace_rest(rest, camera, settings.rest);
+      choice.bounced = measure_rest_light(*renderer, rest, camera, traced_rest, settings.rest);
+      renderer->set_bounced_light(choice.bounced, rest);
+    }
+    const cv::Mat picture = renderer->render(first).irradiance;
+    choice.error = reference.error_of(picture, 1);
+    const auto is_open = [&] {
+      return largest_rms(choice.error) > settings.tolerance && smallest_rms(choice.error) < settings.tolerance;
+    };
+    if (!whatever && is_open()) choice.error = reference.error_of(picture, kMorePaths);
+    if (whatever || largest_rms(choice.error) <= settings.tolerance) {
+      choice.renderer = std::move(renderer);
+      break;
+    }
   }
   choice.field = std::move(field);
-  if (!settings.whatever && largest_rms(choice.error) > settings.tolerance) {
+  if (!choice.renderer) {
     choice.reason = fmt::format("the picture is {:.2f} +- {:.2f} % off, {:.2f} % are asked for", 100 * choice.error.rms,
                                 100 * choice.error.rms_error, 100 * settings.tolerance);
-    return choice;
   }
-  choice.renderer = std::move(renderer);
   return choice;
 }
 

@@ -6,6 +6,7 @@
 #include <memory>
 #include <opencv2/core/mat.hpp>
 #include <string>
+#include <vector>
 
 #include "render/direct/direct_renderer.h"
 #include "render/direct/rest_light.h"
@@ -46,7 +47,8 @@ DirectError direct_error_beside(const std::array<cv::Mat, 2>& traced, const cv::
 struct DirectChoice {
   std::unique_ptr<DirectRenderer> renderer;  ///< null where direct light won't do; `reason` then says why
   std::string reason;
-  DirectError error;  ///< of `first`, if it was drawn
+  DirectError error;  ///< of `first`, if it was drawn, with the last number of rays that was tried
+  int samples = 0;    ///< that number
   /// What the renderer was made of, for further ones that draw the same pictures: with the camera and `rest` without
   /// interreflection, and set_bounced_light with `rest`.
   LightField field;
@@ -56,8 +58,11 @@ struct DirectChoice {
 /// What choose_direct may choose, and how accurate it has to be.
 struct DirectChoiceSettings {
   double tolerance = 0.015;  ///< of the root mean square difference: what largest_rms may be
-  bool whatever = false;     ///< the error is measured, but any will do
+  bool whatever = false;     ///< the error is measured, but any will do: of several numbers of rays the last
   DirectSettings direct;
+  /// Rays a pixel that are tried in turn, in place of direct.samples, until the tolerance holds; empty: those alone.
+  /// Light field and paths serve them all.
+  std::vector<int> samples;
   GuideCut guides;
   double field_accuracy = 0.0;  ///< LightFieldSettings::accuracy; 0: half of the tolerance, 1e-4 to 1e-2
   double lit_radius = 0.0;      ///< LightFieldSettings::lit_radius

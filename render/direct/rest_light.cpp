@@ -34,6 +34,16 @@ double smoothing_px(const Scene& rest, const Camera& camera, const RestLightSett
   return settings.smooth_mm * pixels_per_mm(camera, rest);
 }
 
+void check(const RestLightSettings& settings) {
+  if (settings.samples < 1 || settings.samples > 1 << 20) {
+    fail("rest light: samples is {}; it must be from 1 to 1048576", settings.samples);
+  }
+  if (settings.paths < 1) fail("rest light: paths is {}; it must be at least 1", settings.paths);
+  if (!(settings.smooth_mm >= 0.0 && settings.smooth_mm <= 1e3)) {
+    fail("rest light: smooth_mm is {}; it must be from 0 to 1000", settings.smooth_mm);
+  }
+}
+
 }  // namespace
 
 int rest_light_samples(const Scene& rest, const Camera& camera, const RestLightSettings& settings) {
@@ -42,19 +52,27 @@ int rest_light_samples(const Scene& rest, const Camera& camera, const RestLightS
   return std::min(settings.samples, static_cast<int>(std::ceil(settings.paths / window)));
 }
 
-cv::Mat measure_rest_light(DirectRenderer& renderer, const Scene& rest, const Camera& camera,
-                           const RestLightSettings& settings) {
-  if (settings.samples < 1 || settings.samples > 1 << 20) {
-    fail("rest light: samples is {}; it must be from 1 to 1048576", settings.samples);
-  }
-  if (settings.paths < 1) fail("rest light: paths is {}; it must be at least 1", settings.paths);
-  if (!(settings.smooth_mm >= 0.0 && settings.smooth_mm <= 1e3)) {
-    fail("rest light: smooth_mm is {}; it must be from 0 to 1000", settings.smooth_mm);
-  }
-  Scene direct = rest;
-  direct.interreflection = false;
+cv::Mat trace_rest(const Scene& rest, const Camera& camera, const RestLightSettings& settings) {
+  check(settings);
   Scene whole = rest;
   whole.interreflection = true;
+  RenderSettings paths;
+  paths.seed = settings.seed;
+  paths.min_samples = paths.max_samples = rest_light_samples(rest, camera, settings);
+  paths.max_depth = settings.max_depth;
+  return Tracer(whole).render(camera, paths).irradiance;
+}
+
+cv::Mat measure_rest_light(DirectRenderer& renderer, const Scene& rest, const Camera& camera,
+                           const RestLightSettings& settings) {
+  return measure_rest_light(renderer, rest, camera, trace_rest(rest, camera, settings), settings);
+}
+
+cv::Mat measure_rest_light(DirectRenderer& renderer, const Scene& rest, const Camera& camera, const cv::Mat& traced,
+                           const RestLightSettings& settings) {
+  check(settings);
+  Scene direct = rest;
+  direct.interreflection = false;
   const auto bands = static_cast<int>(rest.environment.size());
   const Eigen::Vector2i size = size_of(camera);
 
@@ -67,11 +85,7 @@ cv::Mat measure_rest_light(DirectRenderer& renderer, const Scene& rest, const Ca
   renderer.set_bounced_light({});
 
   const double sigma = smoothing_px(rest, camera, settings);
-  RenderSettings paths;
-  paths.seed = settings.seed;
-  paths.min_samples = paths.max_samples = rest_light_samples(rest, camera, settings);
-  paths.max_depth = settings.max_depth;
-  cv::Mat added = Tracer(whole).render(camera, paths).irradiance - plain;
+  cv::Mat added = traced - plain;
 
   if (sigma > 0.1) {
     cv::GaussianBlur(added, added, cv::Size(), sigma, sigma, cv::BORDER_REFLECT);

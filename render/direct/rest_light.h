@@ -30,11 +30,19 @@ struct RestLightSettings {
 /// Left out is that a facet faces a brighter or darker side, and what a level place sees of flanks beside it.
 /// measure_direct_error (direct_error.h) tells how much that is.
 ///
+/// `traced` is trace_rest()'s answer.
+///
 /// Noise of the path tracer is smoothed away with the response of the picture to a unit irradiance as weight, so that
 /// beads and printless edges don't smear.
-/// @throws Error as Tracer and DirectRenderer::render, or if a setting is out of range
+/// @throws Error as DirectRenderer::render, or if a setting is out of range
+cv::Mat measure_rest_light(DirectRenderer& renderer, const Scene& rest, const Camera& camera, const cv::Mat& traced,
+                           const RestLightSettings& settings = {});
+/// The same, tracing by itself. @throws Error also as Tracer
 cv::Mat measure_rest_light(DirectRenderer& renderer, const Scene& rest, const Camera& camera,
                            const RestLightSettings& settings = {});
+
+/// `rest` by paths, with interreflection: the same for all renderers. @throws Error as measure_rest_light
+cv::Mat trace_rest(const Scene& rest, const Camera& camera, const RestLightSettings& settings = {});
 
 /// Paths a pixel that it takes, with the same arguments.
 int rest_light_samples(const Scene& rest, const Camera& camera, const RestLightSettings& settings = {});
