@@ -229,7 +229,7 @@ void plan_relief(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   // A coating shows each slope. On the gel's mesh a ball's contact ends on whole edges and what is free is averaged
   // over them: of edges of 0.5 mm under a ball of 4 mm the surface comes out 15 um and its slope 2 to 4 degrees off.
   const bool shows_slopes = scene.device.coating && scene.outputs.camera() && is_gentle(scene.device.gel) &&
-                            scene.more_objects.empty() && !plan.elastic_object && !plan.finite_strain;
+                            scene.more_objects.empty() && !plan.elastic_object;
   const std::string why =
       shows_slopes && !fine ? "a coating shows the surface's slope, which the gel's mesh has to some degrees only"
       : !detail             ? "the object's shape is smooth: the gel's mesh has all of it"
@@ -240,10 +240,7 @@ void plan_relief(const SceneSpec& scene, Plan& plan, PlanTable& table) {
               : fmt::format("the object has detail of {:.3g} mm, the gel's edges have {:.3g} mm", *detail, edge);
   const std::string cost = fine ? "0.1 to 1 second a frame" : "10 to 50 milliseconds a frame";
   const bool called_for = (fine && seen) || shows_slopes;
-  // The fine contact answers by linear elasticity: it isn't measured against a finite strain's surface.
-  plan.fine_relief = plan.finite_strain
-                         ? table.add("fine relief", scene.effects.fine_relief, called_for, why, cost)
-                         : table.add_by_need("fine relief", scene.effects.fine_relief, called_for, why, cost);
+  plan.fine_relief = table.add_by_need("fine relief", scene.effects.fine_relief, called_for, why, cost);
   if (plan.fine_relief && !scene.more_objects.empty()) {
     fail_at(scene.where, "fine relief isn't simulated with several objects; effects.fine_relief: off leaves it out");
   }
