@@ -12,6 +12,7 @@
 #include "core/yaml_reader.h"
 #include "datasets/jobs/prepared_job.h"
 #include "datasets/jobs/scene_plan.h"
+#include "datasets/sets/drawn_needs.h"
 #include "datasets/sets/job_cost.h"
 #include "datasets/sets/planned_draw.h"
 #include "lab/studies/study_plan.h"
@@ -166,27 +167,40 @@ void plan_job(const std::filesystem::path& file, const Asked& asked, const Globa
 }
 
 void plan_draw(const std::filesystem::path& file, const Asked& asked, const GlobalOptions& global) {
-  const datasets::PreparedDraw draw = datasets::prepare_draw(file);
-  const std::vector<datasets::PlannedDraw> planned = datasets::planned_draws(draw);
+  datasets::PreparedDraw draw = datasets::prepare_draw(file);
+  std::vector<datasets::NeededDraw> needed;
+  {
+    ProgressBar bar(global.quiet);
+    needed = datasets::plan_by_need(draw, global.cache, bar.listener());
+  }
+  const bool by_need = !needed.empty();
+  if (!by_need) {
+    for (datasets::PlannedDraw& one : datasets::planned_draws(draw)) {
+      sim::Plan plan = sim::make_plan(one.scene);
+      needed.push_back({std::move(one), std::move(plan)});
+    }
+  }
   const std::size_t objects = draw.job.draw.objects.size();
-  std::vector<sim::Plan> plans;
-  for (const datasets::PlannedDraw& one : planned) plans.push_back(sim::make_plan(one.scene));
   fmt::print("job {}: draws {} samples; units: {}, objects: {}, files: {}\n", draw.job.name, draw.job.samples,
              draw.job.draw.units.count, objects, draw.blocks.size());
-  fmt::print("Of each object its first sample is planned. Switches are those of every job that draws.\n");
-  for (std::size_t k = 0; k < planned.size(); ++k) {
-    const datasets::PlannedDraw& one = planned[k];
-    print_next(fmt::format("{} (sample {}, unit {})", one.object, one.sample, one.unit), plans[k],
-               k == 0 ? nullptr : &plans[k - 1]);
+  fmt::print("{}", by_need
+                       ? "Of each object its hardest sample is planned. What one of them calls for all are "
+                         "simulated with; friction always.\n"
+                       : "Of each object its first sample is planned. Switches are those of every job that draws.\n");
+  for (std::size_t k = 0; k < needed.size(); ++k) {
+    const datasets::PlannedDraw& one = needed[k].draw;
+    print_next(fmt::format("{} (sample {}, unit {})", one.object, one.sample, one.unit), needed[k].plan,
+               k == 0 ? nullptr : &needed[k - 1].plan);
   }
-  if (planned.size() < objects) {
-    fmt::print("\n{} of the objects are in none of the samples that were searched\n", objects - planned.size());
+  if (by_need) fmt::print("\nAll samples: {}\n", datasets::in_words(draw.effects));
+  if (needed.size() < objects) {
+    fmt::print("\n{} of the objects are in none of the samples that were searched\n", objects - needed.size());
   }
-  const datasets::PlannedDraw& first = planned.front();
+  const datasets::PlannedDraw& first = needed.front().draw;
   if (first.by_maps) {
     fmt::print("\nPictures are made from maps of what touches the milky gel; the plan is of the mechanics alone.\n");
   }
-  if (plans.front().scattering && first.scene.device.coating) {
+  if (needed.front().plan.scattering && first.scene.device.coating) {
     fmt::print(
         "\nThe gel is milky under a coating: pictures are made from maps of it where these are found to be good "
         "enough, else by path tracing.\n");

@@ -84,9 +84,10 @@ ResultTable totals_table(const Runs& runs, const std::string& name, const std::s
       fmt::format("Scenes that can't be simulated: {}; they are in no row.", failed),
       "One thread. Seconds are those that it worked, which are those on the clock where nobody else is at work.",
       fmt::format(
-          "Rates: {:.3g} s for 1e9 operations of an elimination, {:.3g} ms for 1000 unknowns, {:.3g} ms for 1000 "
-          "rows pressed on, {:.3g} s for 1e9 operations at finite strain.",
-          1e9 * rates.elimination_s, 1e6 * rates.unknown_s, 1e6 * rates.pressed_row_s, 1e9 * rates.newton_s)};
+          "Rates: {:.3g} s for 1e9 operations of an elimination, {:.3g} ms for 1000 unknowns, {:.3g} s "
+          "for bodies of one radius on a flat gel, {:.3g} on a dome, {:.3g} for 1e9 operations at finite strain.",
+          1e9 * rates.elimination_s, 1e6 * rates.unknown_s, rates.flat_press_s, rates.curved_press_s,
+          1e9 * rates.newton_s)};
   return table;
 }
 
@@ -150,7 +151,9 @@ int main(int argc, char** argv) {
         runs.trials.push_back(lab::need_trial(scenes, seed, k));
         runs.outcomes.push_back(lab::run_cost_trial(runs.trials.back(), with_accuracy, rates, cache.path, gels));
         const lab::CostOutcome& one = runs.outcomes.back();
-        fmt::print("{}: {} {}\n", runs.trials.back().what, pair(one.in_all()), one.failure);
+        fmt::print("{}: gel {}, mechanics {}, camera {}, pictures {}, in all {}; {} ({}) {}\n", runs.trials.back().what,
+                   pair(one.gel), pair(one.mechanics), pair(one.camera), pair(one.frames), pair(one.in_all()),
+                   one.light, one.light_then, one.failure);
         std::fflush(stdout);
       }
       const std::string name = with_accuracy ? "need" : "shares";

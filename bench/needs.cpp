@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdio>
 
 #include "bench/report.h"
 #include "lab/bench/need_bench.h"
@@ -21,6 +22,16 @@ struct Looks {
 
 std::string share(int part, int all) {
   return all == 0 ? "-" : fmt::format("{:.0f} % of {}", 100.0 * part / all, all);
+}
+
+/// As it goes: the page comes at the end.
+void print(const lab::NeedTrial& trial, const lab::NeedRun& run) {
+  fmt::print("{}: {:.0f} s, closely {:.0f} s {}\n", trial.what, run.plan_s, run.close_s, run.failure);
+  for (const lab::NeedOutcome& one : run.effects) {
+    fmt::print("  {} {}: {:.2g}, closely {:.2g} {}\n", one.effect, one.on ? "on" : "off", one.planned, one.closely,
+               one.note);
+  }
+  std::fflush(stdout);
 }
 
 ResultTable totals_table(const Looks& looks) {
@@ -119,6 +130,7 @@ int main(int argc, char** argv) {
     for (int k = std::max(0, only); k < (only < 0 ? count : only + 1); ++k) {
       looks.trials.push_back(lab::need_trial(scenes, seed, k));
       looks.runs.push_back(lab::run_need_trial(looks.trials.back(), {}, sim::kCloseLook, cache));
+      print(looks.trials.back(), looks.runs.back());
     }
     report.take(totals_table(looks));
     report.take(effects_table(looks));

@@ -53,7 +53,7 @@ sim/need: core fem/mesh fem/elements fem/contact fem/finite_strain render/paths 
 sim/cost: core fem/mesh fem/elements fem/shapes fem/contact fem/finite_strain fem/error render/cameras render/paths render/imager sim/files sim/scene sim/plan sim/press sim/view sim/sensor
 sim/grasp: core fem/mesh fem/elements fem/contact fem/error fem/fine_relief fem/vibration sim/scene sim/press
 datasets/jobs: core render/lamps sim/relief sim/scene sim/plan sim/press sim/sensor sim/need
-datasets/sets: core fem/elements sensors/events sim/files sim/scene sim/plan sim/press sim/view sim/sensor sim/cost datasets/jobs
+datasets/sets: core fem/elements sensors/events sim/files sim/scene sim/plan sim/need sim/press sim/view sim/sensor sim/cost datasets/jobs
 datasets/exports: core sim/files datasets/sets
 datasets/inspection: core plots render/cameras render/imager sim/files sim/scene sim/plan sim/view datasets/jobs datasets/sets
 lab/statistics: core

@@ -97,6 +97,12 @@ void fields(YamlReader& in, DrawSpec& draw) {
   if (draw.objects.empty()) fail_at(in.where("objects"), "draw.objects: has no object; at least one is needed");
 }
 
+void fields(YamlReader& in, DrawnEffects& effects) {
+  in.optional("elasticity", effects.elasticity);
+  in.optional("fine_relief", effects.fine_relief);
+  in.optional("interreflection", effects.interreflection);
+}
+
 void fields(YamlReader& in, DrawJob& job) {
   job.where = in.where();
   in.required("name", job.name);
@@ -122,6 +128,8 @@ void fields(YamlReader& in, DrawJob& job) {
   in.optional("interreflection_tolerance", job.interreflection_tolerance, Allowed::within(0.0, 1.0));
   in.optional("guide_sectors", job.guides.sectors, Allowed::within(1, 8));
   in.optional("guide_slices", job.guides.slices, Allowed::within(1, 4));
+  in.optional("accuracy", job.accuracy);
+  in.optional("effects", job.effects);
   in.optional("edge_side", job.edge_side);
   if (job.edge_side != 1 && job.edge_side != 2 && job.edge_side != 4) {
     fail_at(in.where("edge_side"), "edge_side: {} is not allowed; allowed is one of: 1, 2, 4", job.edge_side);

@@ -11,6 +11,8 @@
 #include "datasets/jobs/split.h"
 #include "datasets/jobs/spread.h"
 #include "render/lamps/guide_beams.h"
+#include "sim/scene/accuracy.h"
+#include "sim/scene/scene.h"
 
 namespace touchstone::datasets {
 
@@ -79,6 +81,13 @@ struct DrawnOutputs {
 enum class DrawnOutput : std::uint8_t { frame, height, contact, beads, markers, traction, events, statistics };
 EnumNames<DrawnOutput> enum_names(DrawnOutput);
 
+/// The effects that a job that draws may switch by itself.
+struct DrawnEffects {
+  sim::Elasticity elasticity = sim::Elasticity::automatic;
+  sim::Switch fine_relief = sim::Switch::automatic;
+  sim::Switch interreflection = sim::Switch::automatic;
+};
+
 /// A job file of drawn samples, as read and checked.
 struct DrawJob {
   std::string name;
@@ -90,6 +99,9 @@ struct DrawJob {
   double interreflection_tolerance = 0.005;  ///< sim::VirtualSensorSettings
   int edge_side = 4;                         ///< sim::VirtualSensorSettings
   render::GuideCut guides;                   ///< sim::VirtualSensorSettings
+  /// Counts more than the device's. If neither states it, effects are as in every job that draws.
+  std::optional<sim::AccuracySpec> accuracy;
+  DrawnEffects effects;  ///< count more than what the accuracy calls for
   DrawSpec draw;
   DrawnOutputs outputs;
   SplitSpec splits;
@@ -101,6 +113,7 @@ void fields(YamlReader& in, UnitsSpec& units);
 void fields(YamlReader& in, DrawnObjectSpec& object);
 void fields(YamlReader& in, PlaceSpec& place);
 void fields(YamlReader& in, DrawSpec& draw);
+void fields(YamlReader& in, DrawnEffects& effects);
 void fields(YamlReader& in, DrawJob& job);
 
 /// Reads and checks the job file, but not the device and the objects that it names. @throws Error with file and line

@@ -116,6 +116,9 @@ PreparedDraw prepare_draw(const std::filesystem::path& file) {
   const DrawJob& job = prepared.job;
   prepared.device_text = read_whole_file(job.draw.device);
   for (const DrawnObjectSpec& object : job.draw.objects) prepared.object_texts.push_back(read_whole_file(object.file));
+  prepared.effects.elasticity = job.effects.elasticity;
+  prepared.effects.fine_relief = job.effects.fine_relief;
+  prepared.effects.interreflection = job.effects.interreflection;
   prepared.blocks = blocks_of(job);
   if (job.splits.by == SplitBy::unit) {
     prepared.unit_splits = splits_of_units(job.splits, job.seed, job.draw.units.count);
@@ -155,6 +158,7 @@ DrawnUnit drawn_unit(const PreparedDraw& prepared, int unit) {
   const std::string name = prepared.job.draw.device.string();
   drawn.text = varied(prepared.device_text, name, prepared.job.draw.units.vary, random, &drawn.drawn);
   drawn.device = read_varied<sim::DeviceSpec>(drawn.text, name, fmt::format("unit {}", unit));
+  drawn.device.accuracy = sim::merged(prepared.job.accuracy, drawn.device.accuracy);
   return drawn;
 }
 

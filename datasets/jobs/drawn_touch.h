@@ -12,6 +12,7 @@
 #include "sim/press/press_spec.h"
 #include "sim/scene/device.h"
 #include "sim/scene/object.h"
+#include "sim/scene/scene.h"
 
 namespace touchstone::datasets {
 
@@ -36,6 +37,7 @@ struct PreparedDraw {
   std::vector<Split> unit_splits;  ///< for SplitBy::unit
   double deepest_mm = 0.0;         ///< that the gel will be pressed in
   double widest_mm = 0.0;          ///< and moved along itself
+  sim::EffectSwitches effects;     ///< of all its sensors: the job's, and what an accuracy decides (sets/drawn_needs.h)
 };
 
 /// @throws Error with file and line
@@ -44,7 +46,7 @@ PreparedDraw prepare_draw(const std::filesystem::path& file);
 /// One number of a file as it was drawn.
 using DrawnNumber = std::pair<std::string, double>;
 
-/// One sensor of the design.
+/// One sensor of the design. The job's accuracy counts more than its file's.
 struct DrawnUnit {
   int number = 0;
   std::uint64_t seed = 0;  ///< of its imager's fixed pattern

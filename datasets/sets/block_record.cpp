@@ -67,6 +67,7 @@ sim::VirtualSensorSettings drawn_sensor_settings(const PreparedDraw& prepared, c
   settings.interreflection_tolerance = prepared.job.interreflection_tolerance;
   settings.edge_side = prepared.job.edge_side;
   settings.guides = prepared.job.guides;
+  settings.effects = prepared.effects;
   settings.always_friction = true;  // else a straight press would have none beside a tilted one that has
   return settings;
 }
@@ -75,6 +76,10 @@ SensorSource virtual_sensors(const std::filesystem::path& cache_folder) {
   return [cache_folder](const PreparedDraw& prepared, const DrawnUnit& unit) {
     sim::VirtualSensorSettings settings = drawn_sensor_settings(prepared, unit);
     settings.light_key = to_json(light_identity(prepared)) + unit.text;
+    if (const auto accuracy = sim::accuracy_of(unit.device.accuracy, {})) {
+      settings.light_key += fmt::format("\naccuracy {} {} {} {}", accuracy->force_percent, accuracy->pixel_noise,
+                                        accuracy->marker_px, accuracy->height_um);
+    }
     sim::cache_gel_of_unit_modulus(unit.device, cache_folder);
     const auto sensor = std::make_shared<const sim::VirtualSensor>(unit.device, cache_folder, settings);
     UnitSensor made;

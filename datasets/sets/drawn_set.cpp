@@ -15,6 +15,7 @@
 #include "core/whole_file.h"
 #include "datasets/sets/block_file.h"
 #include "datasets/sets/data_card.h"
+#include "datasets/sets/drawn_needs.h"
 #include "datasets/sets/job_cost.h"
 #include "datasets/sets/manifest_parts.h"
 #include "datasets/sets/planned_draw.h"
@@ -199,7 +200,7 @@ void predict(const PreparedDraw& prepared, const Folder& folder, const GenerateO
 
 }  // namespace
 
-GenerateReport generate_draw(const PreparedDraw& prepared, const fs::path& out, const GenerateOptions& options,
+GenerateReport generate_draw(PreparedDraw prepared, const fs::path& out, const GenerateOptions& options,
                              const Progress& progress) {
   const Folder folder = folder_of(prepared, out);
   const Shard& shard = options.shard;
@@ -209,6 +210,9 @@ GenerateReport generate_draw(const PreparedDraw& prepared, const fs::path& out, 
   if (is_finished(folder)) {
     report.was_finished = true;
     return report;
+  }
+  for (const NeededDraw& one : plan_by_need(prepared, options.cache, progress)) {
+    for (const std::string& warning : one.plan.warnings) report.warn(warning);
   }
   for (const PlannedDraw& one : planned_draws(prepared)) {
     report.warn(sim::size_doubt(one.scene.device, one.scene.object));

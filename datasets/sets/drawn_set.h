@@ -8,8 +8,8 @@
 namespace touchstone::datasets {
 
 /// generate() of a job with `draw`.
-GenerateReport generate_draw(const PreparedDraw& prepared, const std::filesystem::path& out,
-                             const GenerateOptions& options, const Progress& progress);
+GenerateReport generate_draw(PreparedDraw prepared, const std::filesystem::path& out, const GenerateOptions& options,
+                             const Progress& progress);
 
 /// merge() of a job with `draw`.
 GenerateReport merge_draw(const PreparedDraw& prepared, const std::filesystem::path& out, const Progress& progress);

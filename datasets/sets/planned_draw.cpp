@@ -1,7 +1,9 @@
 #include "datasets/sets/planned_draw.h"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
+#include <utility>
 
 #include "core/error.h"
 #include "datasets/sets/block_record.h"
@@ -19,6 +21,14 @@ sim::OutputSpec outputs_of(const DrawnOutputs& wanted) {
   outputs.depth = wanted.height;
   outputs.contact = wanted.contact;
   return outputs;
+}
+
+/// By force or depth, whichever the job draws; then by the drag.
+bool is_harder(const DrawnTouch& one, const DrawnTouch& other) {
+  const auto hardness = [](const DrawnTouch& touch) {
+    return std::pair(std::isnan(touch.depth_mm) ? touch.force_N : touch.depth_mm, touch.drag_mm);
+  };
+  return hardness(one) > hardness(other);
 }
 
 PlannedDraw planned(const PreparedDraw& prepared, const DrawnTouch& touch) {
@@ -47,20 +57,19 @@ PlannedDraw planned(const PreparedDraw& prepared, const DrawnTouch& touch) {
 
 }  // namespace
 
-std::vector<PlannedDraw> planned_draws(const PreparedDraw& prepared) {
-  const std::size_t objects = prepared.job.draw.objects.size();
-  std::vector<std::optional<DrawnTouch>> first(objects);
+std::vector<PlannedDraw> planned_draws(const PreparedDraw& prepared, StandsFor which) {
+  std::vector<std::optional<DrawnTouch>> chosen(prepared.job.draw.objects.size());
   std::size_t found = 0;
   const std::int64_t searched = std::min(prepared.job.samples, kSamplesSearched);
-  for (std::int64_t sample = 0; sample < searched && found < objects; ++sample) {
+  for (std::int64_t sample = 0; sample < searched; ++sample) {
     const DrawnTouch touch = drawn_touch(prepared, sample);
-    std::optional<DrawnTouch>& of_object = first[static_cast<std::size_t>(touch.object)];
-    if (of_object) continue;
-    of_object = touch;
-    ++found;
+    std::optional<DrawnTouch>& of_object = chosen[static_cast<std::size_t>(touch.object)];
+    found += of_object ? 0 : 1;
+    if (!of_object || (which == StandsFor::hardest && is_harder(touch, *of_object))) of_object = touch;
+    if (which == StandsFor::first && found == chosen.size()) break;
   }
   std::vector<PlannedDraw> all;
-  for (const std::optional<DrawnTouch>& touch : first) {
+  for (const std::optional<DrawnTouch>& touch : chosen) {
     if (touch) all.push_back(planned(prepared, *touch));
   }
   return all;

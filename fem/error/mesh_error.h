@@ -34,6 +34,9 @@ struct LadderGel {
 /// as coarsely. `largest_factor` as LadderGel's.
 std::vector<double> ladder_factors(double largest_factor);
 
+/// On how many radii bodies are pressed, on each of the ladder's gels.
+int ladder_radii(const LadderGel& ladder);
+
 /// The ladder of a gel: radii as far as its fine part goes, edges up to its thickness.
 LadderGel ladder_of(const GelBody& body, std::span<const ElasticMaterial> materials, std::span<const Bead> beads);
 LadderGel ladder_of(const SlabMesh& slab, const ElasticMaterial& material, std::span<const Bead> beads);

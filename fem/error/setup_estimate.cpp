@@ -35,15 +35,18 @@ SetupCount count_setup(const GelBody& body, std::span<const ElasticMaterial> mat
     all.operations += count.operations;
   };
   add(body);
-  const std::vector<double> factors = ladder_factors(ladder_of(body, materials, beads).largest_factor);
+  const LadderGel ladder = ladder_of(body, materials, beads);
+  const std::vector<double> factors = ladder_factors(ladder.largest_factor);
+  int gels = 1;
   for (const double factor : factors) {
     try {
       add(with_edges(body, factor));
+      ++gels;
     } catch (const Error&) {
       continue;  // set-up leaves it out, too
     }
   }
-  if (!factors.empty()) sum.pressed_rows = all.border;
+  if (!factors.empty()) sum.presses = gels * ladder_radii(ladder);
   return sum;
 }
 

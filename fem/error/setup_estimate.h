@@ -24,7 +24,7 @@ SetupEstimate estimate_setup(const SlabMesh& slab, int beads);
 /// (ladder_factors). Sums over them.
 struct SetupCount {
   fem::EliminationCount eliminations;
-  double pressed_rows = 0.0;  ///< rows of the surfaces that reference bodies are pressed on; 0 without a ladder
+  double presses = 0.0;  ///< radii by gels on which reference bodies are pressed (ladder_radii); 0 without a ladder
 };
 
 /// Meshes the gel and counts; costs some percent of the set-up. @throws Error as mesh_gel() and count_elimination()

@@ -16,12 +16,11 @@
 namespace touchstone::sim {
 namespace {
 
-constexpr double kLookAccuracy = 0.02;  // of the light field that direct light is judged on
+constexpr double kLongestLook_s = 10.0;
+constexpr double kLookAccuracy = 0.02;  // of the light field that direct light is judged on where that takes longer
 constexpr int kLookedAt = 256;          // pixels, at first
 constexpr double kLeastLook_s = 0.05;   // until so much was seen
 constexpr int kMeteringPaths = 8;       // a pixel, as VirtualCamera's
-constexpr double kMostRelief_s = 1.0;
-constexpr int kMostLooked = 16;  // rays a pixel that are drawn; more are taken to hold
 
 /// `count` pixels spread evenly over a picture.
 cv::Mat spread(cv::Size size, int count) {
@@ -48,6 +47,7 @@ class Look {
         size_(render::size_of(camera_).x(), render::size_of(camera_).y()),
         response_(render::response_of(imager(view.scene.device, view.plan.bands, view.plan.sensor_noise))),
         deepest_(deepest(truths)),
+        relief_(relief),
         relief_s_(relief_s) {
     const WorkClock clock;
     scene_ = view.seen(deepest_.press, relief);
@@ -99,72 +99,44 @@ class Look {
     return pixel_s(render::Tracer(scene_), settings) / kPaths;
   }
 
-  /// False if a light field can't be had.
+  /// False if it won't be taken.
   bool direct(LightLook& found) {
-    SceneSpec tried = view_.scene;
-    tried.effects.direct_light = Switch::on;
     Plan plain = view_.plan;
     plain.interreflection = false;  // the light at rest is counted, not traced
-    Plan counted = view_.plan;
-    // A fine contact of many pixels isn't solved again and again: the light that is tried is of the coarse surface.
-    const bool again = relief_s_ < kMostRelief_s;
-    plain.fine_relief = counted.fine_relief = view_.plan.fine_relief && again;
-    const SceneView plain_view(tried, plain, gel_, view_);
-    const SceneView counted_view(view_.scene, counted, gel_, view_);
+    const SceneView plain_view(view_.scene, plain, gel_, view_);
     try {
       WorkClock clock;
-      const DirectWork work = count_direct_work(counted_view, camera_, truths_);
-      const double place_s = std::max(0.0, clock.seconds() - 2.0 * seen_s_ - (again ? relief_s_ : 0.0)) /
-                             std::max(1.0, work.field.looked_at);
+      const DirectWork work = count_direct_work(view_, camera_, truths_, relief_);
+      const double place_s = std::max(0.0, clock.seconds() - 2.0 * seen_s_) / std::max(1.0, work.field.looked_at);
       const double path = path_s();
-      const double once_s = work.field.places * place_s + work.rest_paths * path;
-      if (!work.field.fits) {
-        found.set_up_s += work.field.places * place_s;
-        return false;
+      found.set_up_s += 2.0 * seen_s_ + work.field.places * place_s;
+      if (!work.field.fits) return false;
+      const double paths_s = (work.rest_paths + work.error_paths) * path;
+      const bool quick = found.set_up_s + paths_s < kLongestLook_s;
+      // Where that is quick, light is found as the run will find it; else on a coarse field, without bounced light.
+      const SceneView& tried = quick ? view_ : plain_view;
+      DirectLightSettings wanted;
+      wanted.field_accuracy = quick ? 0.0 : kLookAccuracy;
+      wanted.relief = &relief_;
+      const WorkClock finding;
+      const DirectLight light(tried, camera_, truths_, wanted);
+      if (quick) {
+        found.set_up_s = finding.seconds();
+      } else {
+        found.set_up_s += paths_s;
       }
-      double drawn_s = 0.0;
-      int drawn_rays = 1;
-      for (const int rays : kRaysTried) {
-        Judged judged{true, false, {}};
-        if (rays <= kMostLooked) {
-          const DirectLight light(plain_view, camera_, truths_, std::span(&rays, 1), render::DirectSettings{}.edge_side,
-                                  {}, kLookAccuracy);
-          judged = judge(light);
-          drawn_s = mean_over_frames([&](const render::Scene& scene) { light.render(without_bounces(scene)); });
-        } else {
-          drawn_s *= static_cast<double>(rays) / drawn_rays;
-        }
-        drawn_rays = rays;
-        found.set_up_s += once_s + (judged.open ? 5.0 : 1.0) * work.error_paths * path + drawn_s + 2.0 * seen_s_;
-        found.moment_s = seen_s_ + drawn_s;
-        found.how = rays == 1 ? "direct light" : fmt::format("direct light of {} rays a pixel", rays);
-        holds_ = judged.holds;
-        if (holds_) break;
-      }
+      if (!light.choice().direct) return false;
+      const double drawn_s =
+          mean_over_frames([&](const render::Scene& scene) { light.render(quick ? scene : without_bounces(scene)); });
+      found.moment_s = seen_s_ + drawn_s;
+      found.how = light.choice().reason;
+      holds_ = true;
       return true;
     } catch (const Error&) {
       return false;
     }
   }
 
-  /// Whether a number of rays will hold.
-  struct Judged {
-    bool holds = true;
-    bool open = false;  ///< at first: four times the paths will be traced
-    render::DirectError error;
-  };
-  Judged judge(const DirectLight& light) const {
-    Judged judged;
-    judged.error = light.choice().error.value();  // to which a coarse field adds less than its own error
-    const double tolerance = view_.scene.light.direct_tolerance;
-    double largest = render::largest_rms(judged.error);
-    judged.open = largest > tolerance && render::smallest_rms(judged.error) < tolerance;
-    // With them the error of its square, from two pictures' noise, is a quarter.
-    const double square = judged.error.rms * judged.error.rms;
-    if (judged.open) largest = std::sqrt(square + 0.25 * (largest * largest - square));
-    judged.holds = largest <= tolerance;
-    return judged;
-  }
   static render::Scene without_bounces(render::Scene scene) {
     scene.interreflection = false;
     return scene;
@@ -233,6 +205,7 @@ class Look {
   cv::Size size_;
   render::ImagerResponse response_;
   const Truth& deepest_;
+  const std::optional<fem::ReliefAnswer>& relief_;
   double relief_s_;
   render::Scene first_, scene_;  // at the first frame and at the deepest
   double touching_ = 0.0;        // part of the frames in contact

@@ -11,12 +11,12 @@ namespace touchstone::sim {
 /// Seconds for what is counted, with so many threads.
 struct MachineRates {
   int threads = 1;
-  double elimination_s = 0.0;  ///< an operation of eliminating a gel's inside
-  double unknown_s = 0.0;      ///< an unknown of a gel that is set up: its mesh and its matrix
-  double pressed_row_s = 0.0;  ///< a row of a flat surface on which a mesh's error is measured
-  double curved_row_s = 0.0;   ///< and of a curved one, where bodies are looked up on bent triangles
-  double newton_s = 0.0;       ///< an operation of a factorisation at finite strain
-  double speed_up = 1.0;       ///< so many times one thread's work at a time, of work that is cut into frames
+  double elimination_s = 0.0;   ///< an operation of eliminating a gel's inside
+  double unknown_s = 0.0;       ///< an unknown of a gel that is set up: its mesh and its matrix
+  double flat_press_s = 0.0;    ///< a radius on a flat gel on which a mesh's error is measured (fem::SetupCount)
+  double curved_press_s = 0.0;  ///< and on a curved one, where bodies are looked up on bent triangles
+  double newton_s = 0.0;        ///< an operation of a factorisation at finite strain
+  double speed_up = 1.0;        ///< so many times one thread's work at a time, of work that is cut into frames
 };
 
 /// Measures them, with `threads` threads (0: as many as the machine has): some five seconds.

@@ -32,7 +32,7 @@ std::optional<double> gel_setup_seconds(const DeviceSpec& device, const MachineR
   if (device.mesh.force_error) return std::nullopt;
   const fem::SetupCount count = fem::count_setup(body, fem::per_body_modulus(materials), beads);
   const bool flat = std::holds_alternative<fem::SlabGel>(body);
-  return seconds_of(count.eliminations, rates) + (flat ? rates.pressed_row_s : rates.curved_row_s) * count.pressed_rows;
+  return seconds_of(count.eliminations, rates) + (flat ? rates.flat_press_s : rates.curved_press_s) * count.presses;
 }
 
 double elastic_setup_seconds(const ObjectSpec& object, const MachineRates& rates) {

@@ -29,7 +29,7 @@ ObjectSpec far_ball() {
 class ClearView final : public SensorView {
  public:
   ClearView(const DeviceSpec& device, const fem::Compliance& gel, const VirtualSensorSettings& settings)
-      : device_(device), gel_(gel), seed_(settings.seed), plan_(make_plan(scene_of(far_ball(), {}))) {
+      : device_(device), gel_(gel), settings_(settings), plan_(make_plan(scene_of(far_ball(), {}))) {
     choice_.reason = plan_.shared_paths ? "paths, shared between pixels: the gel is clear" : "paths: the gel is clear";
     nothing_.spec = far_ball();
     // What a point of the gel projects to needs the device's faces and media alone.
@@ -74,7 +74,7 @@ class ClearView final : public SensorView {
 
  private:
   SceneSpec scene_of(const ObjectSpec& object, const MotionSpec& motion) const {
-    return clear_scene(device_, seed_, object, motion);
+    return clear_scene(device_, settings_, object, motion);
   }
 
   Truth start_of(const SeenObject& object, const Eigen::Vector3d& start) const {
@@ -102,7 +102,7 @@ class ClearView final : public SensorView {
 
   DeviceSpec device_;
   const fem::Compliance& gel_;
-  std::uint64_t seed_;
+  VirtualSensorSettings settings_;
   Plan plan_;
   LightChoice choice_;
   render::ReadyCamera still_;
@@ -112,17 +112,16 @@ class ClearView final : public SensorView {
 
 }  // namespace
 
-SceneSpec clear_scene(const DeviceSpec& device, std::uint64_t seed, const ObjectSpec& object,
+SceneSpec clear_scene(const DeviceSpec& device, const VirtualSensorSettings& settings, const ObjectSpec& object,
                       const MotionSpec& motion) {
   SceneSpec scene;
   scene.device = device;
   scene.object = object;
   scene.motion = motion;
-  scene.seed = seed;
+  scene.seed = settings.seed;
   scene.outputs = {.frames = true, .radiance = true};
   scene.outputs.contact = true;
-  scene.effects.motion_blur = Switch::off;
-  scene.effects.rolling_shutter = Switch::off;
+  scene.effects = effects_of(settings, object);
   return scene;
 }
 

@@ -11,8 +11,9 @@ namespace touchstone::sim {
 
 struct VirtualSensorSettings;
 
-/// The scene that the view shows where `object` moves like this; `seed` is of the unit.
-SceneSpec clear_scene(const DeviceSpec& device, std::uint64_t seed, const ObjectSpec& object, const MotionSpec& motion);
+/// The scene that the view shows where `object` moves like this.
+SceneSpec clear_scene(const DeviceSpec& device, const VirtualSensorSettings& settings, const ObjectSpec& object,
+                      const MotionSpec& motion);
 
 /// @pre the device has a camera @throws Error for a device that scenes can't show either
 std::unique_ptr<const SensorView> clear_view(const DeviceSpec& device, const fem::Compliance& gel,

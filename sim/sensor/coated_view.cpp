@@ -92,10 +92,9 @@ SceneSpec scene_with(const DeviceSpec& device, const VirtualSensorSettings& sett
   scene.seed = settings.seed;
   scene.membrane.pixel_um = settings.membrane_um;
   scene.light.interreflection_tolerance = settings.interreflection_tolerance;
-  scene.effects.fine_relief = is_gentle(device.gel) && !object.elastic ? Switch::on : Switch::off;
-  if (settings.always_friction && object.friction > 0.0) scene.effects.friction = Switch::on;
-  scene.effects.motion_blur = Switch::off;
-  scene.effects.rolling_shutter = Switch::off;
+  scene.effects = effects_of(settings, object);
+  if (!is_gentle(device.gel)) scene.effects.fine_relief = Switch::off;
+  if (scene.effects.fine_relief == Switch::automatic) scene.effects.fine_relief = Switch::on;
   scene.effects.direct_light = direct ? Switch::on : Switch::off;
   return scene;
 }
@@ -108,10 +107,15 @@ bool is_fit_for_direct_light(const DeviceSpec& device, const VirtualSensorSettin
 /// Empty where the light isn't to be kept.
 std::string light_key(const VirtualSensorSettings& settings) {
   if (settings.light_key.empty()) return {};
-  return sha256_of(fmt::format("touchstone light, format {}, {} {} {} {} {} {} {} {} {} {}\n{}", kLightFormat,
+  const EffectSwitches& effects = settings.effects;
+  std::string switches;
+  for (const Switch one : {effects.interreflection, effects.translucent_coating, effects.fine_relief}) {
+    switches += fmt::format(" {}", static_cast<int>(one));
+  }
+  return sha256_of(fmt::format("touchstone light, format {}, {} {} {} {} {} {} {} {} {} {}{}\n{}", kLightFormat,
                                settings.seed, settings.deepest_mm, settings.widest_mm, settings.membrane_um,
                                settings.interreflection_tolerance, settings.always_friction, settings.edge_side,
-                               settings.guides.sectors, settings.guides.slices, settings.field_accuracy,
+                               settings.guides.sectors, settings.guides.slices, settings.field_accuracy, switches,
                                settings.light_key));
 }
 
@@ -166,8 +170,12 @@ class CoatedView final : public SensorView {
       if (direct_ == nullptr) {
         std::vector<Truth> states = farthest_states(rest_, settings_, gel_, device_.gel);
         states.push_back(play(straight_press(above, radius - 0.5 * settings_.deepest_mm)).back());
-        direct_ = std::make_unique<const DirectLight>(*judged_, camera_, states, kRaysAPixel, settings_.edge_side,
-                                                      settings_.guides, settings_.field_accuracy);
+        DirectLightSettings wanted;
+        wanted.rays = kRaysAPixel;
+        wanted.edge_side = settings_.edge_side;
+        wanted.guides = settings_.guides;
+        wanted.field_accuracy = settings_.field_accuracy;
+        direct_ = std::make_unique<const DirectLight>(*judged_, camera_, states, wanted);
         if (!key.empty()) keep(cache_folder, [&] { write_light(cache_folder, key, direct_->found()); });
       }
       choice_ = direct_->choice();

@@ -90,10 +90,10 @@ struct AskedLight {
   Eigen::AlignedBox3d reach;
   render::DirectChoiceSettings settings;
 
-  AskedLight(const SceneView& view, std::span<const Truth> truths)
+  AskedLight(const SceneView& view, std::span<const Truth> truths, const std::optional<fem::ReliefAnswer>* relief)
       : rest(for_direct_light(view.seen(at_rest(truths.front().press), {}))) {
     const Truth& judged = deepest(truths);
-    pressed = for_direct_light(view.seen(judged.press, view.relief(judged.press)));
+    pressed = for_direct_light(view.seen(judged.press, relief != nullptr ? *relief : view.relief(judged.press)));
     reach = reach_of(rest, pressed, truths, -view.scene.device.gel.thickness_mm);
     settings.tolerance = view.scene.light.direct_tolerance;
     settings.direct.seed = settings.error.seed = settings.rest.seed = view.scene.seed;
@@ -104,9 +104,10 @@ struct AskedLight {
 
 }  // namespace
 
-DirectWork count_direct_work(const SceneView& view, const render::Camera& camera, std::span<const Truth> truths) {
+DirectWork count_direct_work(const SceneView& view, const render::Camera& camera, std::span<const Truth> truths,
+                             const std::optional<fem::ReliefAnswer>& relief) {
   TS_ASSERT(view.plan.direct_light && !truths.empty());
-  const AskedLight asked(view, truths);
+  const AskedLight asked(view, truths, &relief);
   DirectWork work;
   render::Scene direct = asked.rest;
   direct.interreflection = false;
@@ -122,24 +123,19 @@ DirectWork count_direct_work(const SceneView& view, const render::Camera& camera
 }
 
 DirectLight::DirectLight(const SceneView& view, const render::Camera& camera, std::span<const Truth> truths,
-                         std::span<const int> rays_tried, int edge_side, const render::GuideCut& guides,
-                         double field_accuracy)
+                         const DirectLightSettings& wanted)
     : camera_(camera) {
-  TS_ASSERT(view.plan.direct_light && !truths.empty() && !rays_tried.empty());
+  TS_ASSERT(view.plan.direct_light && !truths.empty() && !wanted.rays.empty());
   const SceneSpec& scene = view.scene;
   const bool forced = scene.effects.direct_light == Switch::on;
-  AskedLight asked(view, truths);
+  AskedLight asked(view, truths, wanted.relief);
   render::DirectChoiceSettings& settings = asked.settings;
-  settings.direct.edge_side = edge_side;
-  settings.guides = guides;
-  settings.field_accuracy = field_accuracy;
-  render::DirectChoice chosen;
-  for (const int rays : rays_tried) {
-    settings.direct.samples = rays;
-    settings.whatever = forced && rays == rays_tried.back();
-    chosen = render::choose_direct(asked.rest, asked.pressed, camera, asked.reach, settings);
-    if (chosen.renderer || chosen.error.pixels == 0) break;
-  }
+  settings.direct.edge_side = wanted.edge_side;
+  settings.guides = wanted.guides;
+  settings.field_accuracy = wanted.field_accuracy;
+  settings.samples.assign(wanted.rays.begin(), wanted.rays.end());
+  settings.whatever = forced;
+  render::DirectChoice chosen = render::choose_direct(asked.rest, asked.pressed, camera, asked.reach, settings);
   if (chosen.error.pixels > 0) choice_.error = chosen.error;
   if (!chosen.renderer) {
     if (forced) fail_at(scene.where, "effects.direct_light: on, but {}", chosen.reason);
@@ -149,7 +145,7 @@ DirectLight::DirectLight(const SceneView& view, const render::Camera& camera, st
     return;
   }
   choice_.direct = true;
-  const int rays = settings.direct.samples;
+  const int rays = settings.direct.samples = chosen.samples;
   choice_.reason =
       with_figures(rays == 1 ? "direct light" : fmt::format("direct light of {} rays a pixel", rays), chosen.error);
   settings_ = settings.direct;

@@ -26,28 +26,37 @@ struct FoundLight {
   cv::Mat bounced;
 };
 
-/// What trying direct light takes with each number of rays, but for the picture itself.
+/// What finding direct light takes, but for the pictures that are tried.
 struct DirectWork {
   render::LightFieldCount field;
   double rest_paths = 0.0;   ///< traced for the bounced light of the gel at rest
   double error_paths = 0.0;  ///< traced to measure its error; four times as many where that leaves it open
 };
 
-/// Counts it. @pre as DirectLight. @throws Error where a light field can't be had
-DirectWork count_direct_work(const SceneView& view, const render::Camera& camera, std::span<const Truth> truths);
+/// Counts it. `relief`: of the state that is pressed deepest. @pre as DirectLight. @throws Error where a light field
+/// can't be had
+DirectWork count_direct_work(const SceneView& view, const render::Camera& camera, std::span<const Truth> truths,
+                             const std::optional<fem::ReliefAnswer>& relief);
+
+/// How direct light is found, besides what the scene says.
+struct DirectLightSettings {
+  std::span<const int> rays = kRaysTried;              ///< a pixel, tried in turn until the scene's tolerance holds
+  int edge_side = render::DirectSettings{}.edge_side;  ///< render::DirectSettings
+  render::GuideCut guides;                             ///< render::LightFieldSettings
+  double field_accuracy = 0.0;                         ///< render::DirectChoiceSettings
+  /// The fine contact of the state that is pressed deepest, where it has been solved already.
+  const std::optional<fem::ReliefAnswer>* relief = nullptr;
+};
 
 /// Tier 1 of the renderers for one scene. Made once; `render` is pure and may be called from several threads.
 class DirectLight {
  public:
   /// Measures on the state of `truths` that is pressed deepest, with ever more rays a pixel until the scene's tolerance
   /// holds; `choice` then says what became of it. Where the scene switches direct light on, the last is taken.
-  /// `edge_side` is DirectSettings::edge_side, `guides` is LightFieldSettings::guides, `field_accuracy`
-  /// DirectChoiceSettings::field_accuracy.
-  /// @pre the plan has direct light, `truths` isn't empty
+  /// @pre the plan has direct light, neither `truths` nor the rays are empty
   /// @throws Error with the scene's place if the scene switches direct light on and it can't be had
   DirectLight(const SceneView& view, const render::Camera& camera, std::span<const Truth> truths,
-              std::span<const int> rays_tried = kRaysTried, int edge_side = render::DirectSettings{}.edge_side,
-              const render::GuideCut& guides = {}, double field_accuracy = 0.0);
+              const DirectLightSettings& wanted = {});
 
   /// As it was found before, of the same scene and camera and with the same edge_side. `still`: the gel untouched.
   /// @throws Error if its lamps, bands or pixels aren't the scene's and the camera's

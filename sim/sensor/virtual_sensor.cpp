@@ -76,7 +76,7 @@ SceneSpec unseen_scene(const DeviceSpec& device, const VirtualSensorSettings& se
   scene.seed = settings.seed;
   scene.outputs = {};
   scene.outputs.frames = false;
-  if (settings.always_friction && object.friction > 0.0) scene.effects.friction = Switch::on;
+  scene.effects = effects_of(settings, object);
   return scene;
 }
 
@@ -240,11 +240,23 @@ struct VirtualSensor::Parts {
   mutable std::unique_ptr<const Optics> made;
 };
 
+EffectSwitches effects_of(const VirtualSensorSettings& settings, const ObjectSpec& object) {
+  EffectSwitches effects = settings.effects;
+  effects.friction = settings.always_friction && object.friction > 0.0 ? Switch::on : Switch::automatic;
+  effects.direct_light = Switch::automatic;
+  effects.motion_blur = effects.rolling_shutter = Switch::off;  // a touch is shown as it ends
+  if (object.elastic) {
+    effects.elasticity = Elasticity::linear;
+    effects.fine_relief = Switch::off;
+  }
+  return effects;
+}
+
 SceneSpec touch_scene(const DeviceSpec& device, const VirtualSensorSettings& settings, const ObjectSpec& object,
                       const MotionSpec& motion, bool picture) {
   if (!picture || !device.camera || is_milky(device)) return unseen_scene(device, settings, object, motion);
   return device.coating ? coated_scene(device, settings, object, motion)
-                        : clear_scene(device, settings.seed, object, motion);
+                        : clear_scene(device, settings, object, motion);
 }
 
 VirtualSensor::VirtualSensor(DeviceSpec device, const std::filesystem::path& cache_folder,

@@ -12,8 +12,8 @@ void expect_equal(const MachineRates& one, const MachineRates& other) {
   EXPECT_EQ(one.threads, other.threads);
   EXPECT_EQ(one.elimination_s, other.elimination_s);
   EXPECT_EQ(one.unknown_s, other.unknown_s);
-  EXPECT_EQ(one.pressed_row_s, other.pressed_row_s);
-  EXPECT_EQ(one.curved_row_s, other.curved_row_s);
+  EXPECT_EQ(one.flat_press_s, other.flat_press_s);
+  EXPECT_EQ(one.curved_press_s, other.curved_press_s);
   EXPECT_EQ(one.newton_s, other.newton_s);
   EXPECT_EQ(one.speed_up, other.speed_up);
 }
