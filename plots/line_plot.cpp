@@ -126,6 +126,52 @@ std::string draw_curve(const PlotCurve& curve, const char* colour, const Axis& x
          marks;
 }
 
+/// Texts beside points, each where no earlier one is, as far as there is such a place.
+class Labels {
+ public:
+  std::string draw(const PlotCurve& curve, const char* colour, const Axis& x, const Axis& y) {
+    std::string svg;
+    for (std::size_t i = 0; i < std::min(curve.labels.size(), curve.points.size()); ++i) {
+      const auto& [px, py] = curve.points[i];
+      if (!x.shows(px) || !y.shows(py) || curve.labels[i].empty()) continue;
+      const Box box = free_place(x.place(px), y.place(py), kLetter * static_cast<double>(curve.labels[i].size()));
+      taken_.push_back(box);
+      svg += text_at(box.left, box.top + kLine - 3.0, "start", curve.labels[i],
+                     fmt::format(" fill=\"{}\" font-size=\"11\"", colour));
+    }
+    return svg;
+  }
+
+ private:
+  struct Box {
+    double left = 0.0, top = 0.0, width = 0.0;
+  };
+  static constexpr double kLetter = 6.0, kLine = 13.0, kGap = 6.0;
+
+  bool is_free(const Box& box) const {
+    if (box.left < kLeft || box.left + box.width > kRight || box.top < kTop || box.top + kLine > kBottom) return false;
+    return std::none_of(taken_.begin(), taken_.end(), [&](const Box& other) {
+      return box.left < other.left + other.width && other.left < box.left + box.width && box.top < other.top + kLine &&
+             other.top < box.top + kLine;
+    });
+  }
+
+  Box free_place(double at_x, double at_y, double width) const {
+    const Box first{at_x + kGap, at_y - 0.5 * kLine, width};
+    for (int line = 0; line < 20; ++line) {
+      for (const double side : {-1.0, 1.0}) {
+        for (const double left : {at_x + kGap, at_x - kGap - width}) {
+          const Box box{left, at_y - 0.5 * kLine + side * line * kLine, width};
+          if (is_free(box)) return box;
+        }
+      }
+    }
+    return first;
+  }
+
+  std::vector<Box> taken_;
+};
+
 }  // namespace
 
 std::string to_svg(const LinePlot& plot) {
@@ -151,9 +197,10 @@ std::string to_svg(const LinePlot& plot) {
   svg += text_at(0.0, 0.0, "middle", plot.y_label,
                  fmt::format(" transform=\"translate(16 {:.1f}) rotate(-90)\"", 0.5 * (kTop + kBottom)));
   double legend = kTop + 18.0;
+  Labels labels;
   for (std::size_t k = 0; k < plot.curves.size(); ++k) {
     const char* colour = kColours[plot.curves[k].colour.value_or(k) % kColours.size()];
-    svg += draw_curve(plot.curves[k], colour, x, y);
+    svg += draw_curve(plot.curves[k], colour, x, y) + labels.draw(plot.curves[k], colour, x, y);
     if (plot.curves[k].name.empty()) continue;
     svg += text_at(kRight - 8.0, legend, "end", plot.curves[k].name, fmt::format(" fill=\"{}\"", colour));
     legend += 16.0;

@@ -16,6 +16,7 @@ struct PlotCurve {
   bool dashed = false;                     ///< for theory: no marks
   bool joined = true;                      ///< by lines
   std::optional<std::size_t> colour = {};  ///< number in the palette of six; none: as the curves' order
+  std::vector<std::string> labels = {};    ///< beside the points, in their order, where no other label is; or none
 };
 
 /// Curves over one pair of axes; on a logarithmic axis only values above 0 are shown.

@@ -69,7 +69,7 @@ lab/chroma: core plots fem/contact fem/finite_strain render/spectra render/scene
 lab/dvs: core render/membrane render/events sensors/learning sensors/events sim/scene sim/press sim/sensor sim/grasp datasets/sets lab/validation
 lab/reflex: core fem/contact fem/finite_strain render/cameras render/paths render/direct render/imager sensors/reflex sim/scene sim/plan sim/press sim/view datasets/sets lab/validation
 lab/studies: core plots fem/mesh fem/elements fem/shapes fem/contact render/sampling render/imager sensors/beads sensors/tractions sim/scene sim/plan sim/press sim/view sim/sensor datasets/jobs lab/validation lab/press lab/vhs lab/chroma
-lab/bench: core plots fem/mesh fem/elements fem/shapes fem/contact fem/error render/imager sim/files sim/scene sim/plan sim/press sim/view sim/sensor sim/need sim/cost datasets/sets lab/statistics lab/studies
+lab/bench: core plots fem/mesh fem/elements fem/shapes fem/contact fem/error render/cameras render/imager sensors/beads sensors/heights sim/files sim/scene sim/plan sim/press sim/view sim/sensor sim/need sim/cost datasets/sets lab/statistics lab/vhs lab/gelsight lab/studies
 lab/likeness: core render/imager sensors/heights sim/files sim/scene sim/sensor datasets/inspection lab/gelsight
 lab/fit: core render/imager sensors/heights sim/files sim/relief sim/scene sim/press sim/view sim/sensor datasets/jobs datasets/sets datasets/inspection lab/validation lab/gelsight lab/studies lab/likeness
 lab/schema: core sim/scene datasets/jobs lab/vhs lab/studies lab/fit

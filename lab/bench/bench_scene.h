@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <opencv2/core/mat.hpp>
 #include <optional>
 #include <string>
@@ -16,6 +17,9 @@
 #include "sim/sensor/virtual_sensor.h"
 
 namespace touchstone::lab {
+
+inline constexpr double kUnknown =
+    std::numeric_limits<double>::quiet_NaN();  ///< a figure that wasn't or couldn't be measured
 
 /// An object held against a device in several poses, each pressed down and then dragged.
 struct BenchPresses {

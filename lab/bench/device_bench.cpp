@@ -35,6 +35,7 @@ void check(const sim::DeviceSpec& device, const BenchSettings& settings) {
   above_zero("pixel error", settings.pixel_error);
   if (settings.depth_mm) above_zero("depth", *settings.depth_mm);
   if (settings.most_pixels < 1000) fail("pixels are {}; allowed are at least 1000", settings.most_pixels);
+  check(settings.estimator);
   if (settings.most_tetrahedra < 1) fail("tetrahedra are {}; allowed is at least 1", settings.most_tetrahedra);
   if (device.mesh.force_error) {
     fail_at(device.where, "mesh.force_error: a bench varies the mesh's edges, so it needs fine_mm and coarse_mm");
@@ -42,16 +43,6 @@ void check(const sim::DeviceSpec& device, const BenchSettings& settings) {
   if (settings.object && settings.object->elastic) {
     fail("object {}: a bench takes rigid objects; this one is elastic", settings.object->name);
   }
-}
-
-sim::ObjectSpec ball_of(double radius_mm) {
-  sim::ObjectSpec ball;
-  ball.name = fmt::format("a ball of {:.3g} mm", 2.0 * radius_mm);
-  ball.shape.type = sim::ShapeKind::sphere;
-  ball.shape.radius_mm = radius_mm;
-  ball.albedo = 0.5;
-  ball.friction = kFriction;
-  return ball;
 }
 
 /// The mesh that the others are measured against: fine only where the presses go.
@@ -221,6 +212,16 @@ std::string reference_in_words(const BenchParts& parts, const BenchCurve& mesh) 
 
 }  // namespace
 
+sim::ObjectSpec bench_ball(double radius_mm) {
+  sim::ObjectSpec ball;
+  ball.name = fmt::format("a ball of {:.3g} mm", 2.0 * radius_mm);
+  ball.shape.type = sim::ShapeKind::sphere;
+  ball.shape.radius_mm = radius_mm;
+  ball.albedo = 0.5;
+  ball.friction = kFriction;
+  return ball;
+}
+
 sim::DeviceSpec with_edges(sim::DeviceSpec device, double factor) {
   device.mesh.fine_mm *= factor;
   device.mesh.coarse_mm *= factor;
@@ -261,10 +262,19 @@ DeviceBench bench_device(const sim::DeviceSpec& device, const BenchSettings& set
   parts.device = device;
   if (device.camera) parts.device.camera = middle_of(*device.camera, settings.most_pixels);
   tell("the device's own gel");
-  parts.own_gel = make_gel(device).gel;
+  MadeGel own = make_gel(device);
+  parts.own_gel = std::move(own.gel);
   const double thickness = parts.own_gel.thickness;
-  parts.presses.object = settings.object ? *settings.object : ball_of(thickness);
+  parts.presses.object = settings.object ? *settings.object : bench_ball(thickness);
   parts.depth_mm = settings.depth_mm.value_or(kDepth * thickness);
+  const auto estimator = [&] {
+    return bench_estimator({device, parts.own_gel, own.seconds, parts.presses.object, parts.depth_mm, settings.seed},
+                           settings.estimator, progress);
+  };
+  if (settings.estimator.alone) {
+    bench.estimator = estimator();
+    return bench;
+  }
   parts.presses.touch_mm = sim::first_touch(sim::PressSpec{}, parts.presses.object, device.gel);
   parts.presses.specs = bench_presses(kBenchPresses, device.mesh.fine_mm, parts.depth_mm, settings.seed);
   const PressForces forces = solve_presses(parts.presses, parts.own_gel, device, device.mesh.fine_mm);
@@ -294,6 +304,13 @@ DeviceBench bench_device(const sim::DeviceSpec& device, const BenchSettings& set
   for (BenchCurve& curve : light_curves(parts, tries, progress)) bench.curves.push_back(std::move(curve));
   bench.choice = cheapest_choice(parts, bench.curves.front(), tries, progress);
   bench.effects = effect_shares(parts, progress);
+  if (settings.estimator.on) {
+    try {
+      bench.estimator = estimator();
+    } catch (const Error& error) {
+      bench.estimator.emplace().none = error.what();  // all else is measured and kept
+    }
+  }
   return bench;
 }
 

@@ -7,13 +7,13 @@
 // (linear elasticity, ray optics) aren't in them; the table of effects has finite strain's.
 
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "core/progress.h"
 #include "lab/bench/bench_scene.h"
+#include "lab/bench/device_bench_estimator.h"
 #include "lab/studies/study_files.h"
 #include "sim/scene/device.h"
 
@@ -28,11 +28,9 @@ struct BenchSettings {
   int most_pixels = 160 * 120;            ///< pictures are compared on so many of their middle
   int most_tetrahedra = 45000;            ///< of the reference's mesh; so many take some 2 GB and a minute
   bool finite_strain = true;              ///< one press at finite strain, which takes up to minutes
+  EstimatorSettings estimator;
   std::uint64_t seed = 1;
 };
-
-inline constexpr double kUnknown =
-    std::numeric_limits<double>::quiet_NaN();  ///< a figure that wasn't or couldn't be measured
 
 /// One setting tried.
 struct BenchPoint {
@@ -102,6 +100,7 @@ struct DeviceBench {
   std::vector<BenchCurve> curves;
   BenchChoice choice;
   std::vector<EffectShare> effects;
+  std::optional<EstimatorBench> estimator;  ///< nothing where it was left out
   BenchSettings settings;
 };
 
@@ -109,8 +108,8 @@ struct DeviceBench {
 ///   in the result
 DeviceBench bench_device(const sim::DeviceSpec& device, const BenchSettings& settings, const Progress& progress = {});
 
-/// bench.md (the answer first), bench.csv (all points), a plot a curve, and DEVICE.yaml, the device's file `text` with
-/// the mesh that was chosen, if it was and the file names its edges.
+/// bench.md (the answer first, or the estimator's part alone), bench.csv (all points), a plot a curve, and DEVICE.yaml,
+/// the device's file `text` with the mesh that was chosen, if it was and the file names its edges.
 StudyResult report(const DeviceBench& bench, const std::string& text);
 
 }  // namespace touchstone::lab

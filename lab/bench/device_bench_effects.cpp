@@ -4,7 +4,6 @@
 
 #include "core/error.h"
 #include "lab/bench/device_bench_parts.h"
-#include "sim/need/switched_effect.h"
 #include "sim/plan/plan.h"
 #include "sim/scene/device_imager.h"
 #include "sim/view/visible_scene.h"
@@ -35,6 +34,10 @@ double once_seconds(const TwoRuns& runs) {
 }
 
 }  // namespace
+
+std::span<const sim::SwitchedEffect> switched_effects() {
+  return kSwitches;
+}
 
 std::vector<EffectShare> effect_shares(const BenchParts& parts, const Progress& progress) {
   std::vector<EffectShare> shares;

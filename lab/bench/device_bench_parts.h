@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "lab/bench/bench_scene.h"
 #include "lab/bench/device_bench.h"
 #include "render/imager/imager.h"
+#include "sim/need/switched_effect.h"
 
 namespace touchstone::lab {
 
@@ -44,6 +46,9 @@ struct BenchParts {
   std::optional<TruePictures> truth;      ///< of the first press on the finest gel; nothing where there are no pictures
   std::optional<TruePictures> own_truth;  ///< likewise on the device's own gel
 };
+
+/// The rigid ball, with friction, that presses where no object is given.
+sim::ObjectSpec bench_ball(double radius_mm);
 
 /// The same device with all edge lengths of its gel's mesh multiplied.
 sim::DeviceSpec with_edges(sim::DeviceSpec device, double factor);
@@ -111,6 +116,9 @@ HoldingMesh coarsest_holding(const BenchCurve& mesh, double force_error, double 
 /// `mesh` gets finer meshes where none of its own holds the wanted errors.
 BenchChoice cheapest_choice(const BenchParts& parts, BenchCurve& mesh, const std::vector<LightSetting>& tries,
                             const Progress& progress);
+
+/// The effects that scenes can switch, by the names that pages show.
+std::span<const sim::SwitchedEffect> switched_effects();
 
 /// What each effect that the plan may leave out contributes on the device's presses, and what it costs.
 std::vector<EffectShare> effect_shares(const BenchParts& parts, const Progress& progress);

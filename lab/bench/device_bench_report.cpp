@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <iterator>
+#include <numeric>
 #include <optional>
 #include <thread>
 
@@ -70,21 +72,40 @@ std::string table_of(const BenchCurve& curve, double least_pixel_error) {
 
 std::string csv_of(const DeviceBench& bench) {
   std::string csv =
-      "curve,setting,value,as_is,once_s,each_s,work,force_error,beads_um,pixel_error,pixel_worst,event_error,note\n";
+      "curve,setting,value,as_is,once_s,each_s,work,force_error,beads_um,pixel_error,pixel_worst,event_error,"
+      "estimator_error,estimator_least,estimator_most,estimator_unit,note\n";
   const auto quoted = [](std::string text) {
     std::replace(text.begin(), text.end(), '"', '\'');
     return '"' + text + '"';
   };
+  const auto add = [&](std::initializer_list<double> values) {
+    for (const double value : values) csv += "," + (std::isfinite(value) ? fmt::format("{:.6g}", value) : "");
+  };
+  const auto note = [&](const std::string& text) { return text.empty() ? text : quoted(text); };
   for (const BenchCurve& curve : bench.curves) {
     for (const BenchPoint& p : curve.points) {
       csv += fmt::format("{},{},{},{}", curve.name, quoted(p.setting), number(p.value), p.as_is ? 1 : 0);
-      for (const double value :
-           {p.once_s, p.each_s, p.work, p.force_error, p.beads_um, p.pixel_error, p.pixel_worst, p.event_error}) {
-        csv += "," + (std::isfinite(value) ? fmt::format("{:.6g}", value) : std::string());
-      }
-      csv += "," + (p.note.empty() ? std::string() : quoted(p.note)) + "\n";
+      add({p.once_s, p.each_s, p.work, p.force_error, p.beads_um, p.pixel_error, p.pixel_worst, p.event_error});
+      csv += ",,,,," + note(p.note) + "\n";
     }
   }
+  if (!bench.estimator || !bench.estimator->none.empty()) return csv;
+  const auto add_row = [&](const char* curve, const EstimatorRow& row, bool as_reference) {
+    csv += fmt::format("{},{},{},{}", curve, quoted(row.name), row.frames, as_reference ? 1 : 0);
+    add({row.once_s, row.each_s});
+    csv += ",,,,,,";
+    if (row.errors.empty()) {
+      add({kUnknown, kUnknown, kUnknown});
+    } else {
+      const auto [least, most] = std::minmax_element(row.errors.begin(), row.errors.end());
+      const double sum = std::accumulate(row.errors.begin(), row.errors.end(), 0.0);
+      add({sum / static_cast<double>(row.errors.size()), *least, *most});
+    }
+    csv += fmt::format(",{},{}\n", bench.estimator->unit, note(row.note));
+  };
+  add_row("estimator", bench.estimator->reference, true);
+  for (const EstimatorRow& row : bench.estimator->rows) add_row("estimator", row, false);
+  for (const EstimatorRow& row : bench.estimator->counts) add_row("estimator frames", row, false);
   return csv;
 }
 
@@ -232,6 +253,15 @@ std::string with_mesh(const std::string& text, const DeviceBench& bench) {
 
 StudyResult report(const DeviceBench& bench, const std::string& text) {
   StudyResult result;
+  if (bench.settings.estimator.alone) {
+    std::string page = fmt::format("# What accuracy costs: {}\n\n", bench.device);
+    page += estimator_page(bench.estimator.value(), result.files);
+    page +=
+        fmt::format("\nMachine: {}, {} threads.\n", datasets::processor_kind(), std::thread::hardware_concurrency());
+    result.files.insert(result.files.begin(), {"bench.md", page});
+    result.files.push_back({"bench.csv", csv_of(bench)});
+    return result;
+  }
   std::string page = fmt::format("# What accuracy costs: {}\n\n{}\n", bench.device, choice_in_words(bench));
   page += fmt::format(
       "## How it was measured\n\n- Presses: {}.\n- Pictures: {}.\n- Reference: {}; light by paths, each pixel by "
@@ -251,6 +281,7 @@ StudyResult report(const DeviceBench& bench, const std::string& text) {
     page += table_of(curve, least_pixel_error) + "\n";
   }
   page += "## Effects\n\n" + effects_table(bench);
+  if (bench.estimator) page += "\n" + estimator_page(*bench.estimator, result.files);
   result.files.insert(result.files.begin(), {"bench.md", page});
   result.files.push_back({"bench.csv", csv_of(bench)});
   if (const std::string device = with_mesh(text, bench); !device.empty()) {

@@ -62,6 +62,13 @@ sim::ObjectSpec with_friction(sim::ObjectSpec object, double friction) {
   return object;
 }
 
+std::optional<sensors::ContactCircle> contact_circle(const cv::Mat& contact) {
+  const cv::Moments moments = cv::moments(contact, true);
+  if (moments.m00 < 1.0) return std::nullopt;
+  return sensors::ContactCircle{{moments.m10 / moments.m00 + 0.5, moments.m01 / moments.m00 + 0.5},
+                                std::sqrt(moments.m00 / kPi)};
+}
+
 HeightCalibrationResult calibrate_heights(const sim::VirtualSensor& sensor, const CalibrationPresses& how,
                                           std::optional<sensors::LightCorrection> correction,
                                           std::uint64_t noise_seed) {
@@ -84,16 +91,15 @@ HeightCalibrationResult calibrate_heights(const sim::VirtualSensor& sensor, cons
     for (const BallPressed& kind : kinds) {
       const sim::Touch touch = sensor.press(kind.ball, {.place_mm = place, .depth_mm = kind.depth_mm},
                                             {.noise_seed = noise_seed + presses.size() + 1});
-      const cv::Moments contact = cv::moments(touch.contact, true);
-      if (contact.m00 < 1.0) fail("calibration: the ball at ({}, {}) mm isn't seen", place.x(), place.y());
-      const Eigen::Vector2d centre(contact.m10 / contact.m00 + 0.5, contact.m01 / contact.m00 + 0.5);
+      const std::optional<sensors::ContactCircle> seen = contact_circle(touch.contact);
+      if (!seen) fail("calibration: the ball at ({}, {}) mm isn't seen", place.x(), place.y());
       sensors::BallPress press;
       press.name = fmt::format("press {}", presses.size() + 1);
       press.frame = touch.frame;
       press.ball_radius_mm = kind.radius_mm;
       press.circle.emplace();
-      press.circle->centre = centre + how.annotation_px * normal_pair(hand);
-      press.circle->radius = std::sqrt(contact.m00 / kPi) + how.annotation_px * hand.normal();
+      press.circle->centre = seen->centre + how.annotation_px * normal_pair(hand);
+      press.circle->radius = seen->radius + how.annotation_px * hand.normal();
       presses.push_back(press);
       try {
         const sensors::ContactCircle found =
@@ -101,7 +107,7 @@ HeightCalibrationResult calibrate_heights(const sim::VirtualSensor& sensor, cons
                                          press.ball_radius_mm, {.mm_per_px = mm_per_px}, press.name);
         ++result.found_circles;
         if (&kind == &kinds.back() && how.wide_ball_depth_mm > 0.0) continue;
-        squares += (found.centre - centre).squaredNorm();
+        squares += (found.centre - seen->centre).squaredNorm();
         ++small_ones;
       } catch (const Error&) {
         // Counted as not found.

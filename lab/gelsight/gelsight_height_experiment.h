@@ -19,6 +19,10 @@ sim::ObjectSpec flat_cylinder_of(double diameter_mm);
 /// The same object with Coulomb's `friction` on the gel.
 sim::ObjectSpec with_friction(sim::ObjectSpec object, double friction);
 
+/// The outline of what touches, as an annotator draws it who sees the contact: the disc of as many pixels about their
+/// middle. Nothing where there is no contact. @pre contact is CV_8UC1, not 0 where there is contact
+std::optional<sensors::ContactCircle> contact_circle(const cv::Mat& contact);
+
 /// How a user calibrates: some frames of the untouched gel, and a ball pressed in at a grid of places, each to every
 /// depth, and a wider one, which shows gentle slopes on more pixels than the small one's middle has. Circles are
 /// annotated by hand: the contact's outline as it is, with errors of `annotation_px`.

@@ -110,6 +110,13 @@ const BenchPoint& point(const BenchCurve& curve, const std::string& setting) {
   return *found;
 }
 
+/// What device_bench_estimator_test.cpp is about takes longer than all else here.
+BenchSettings without_estimator() {
+  BenchSettings settings;
+  settings.estimator.on = false;
+  return settings;
+}
+
 constexpr int kFewTetrahedra = 12000;  // a reference in a few seconds
 
 /// Short of light, as cameras behind a hole are: their noise is some 4 % of what they see.
@@ -125,7 +132,7 @@ sim::DeviceSpec dim_device() {
 
 const DeviceBench& clear_bench() {
   static const DeviceBench bench = [] {
-    BenchSettings settings;
+    BenchSettings settings = without_estimator();
     settings.force_error = 0.03;
     settings.pixel_error = 1.0;
     settings.most_tetrahedra = kFewTetrahedra;
@@ -258,7 +265,7 @@ TEST(CoarsestHolding, LeavesOutWhatCouldNotBeHad) {
 }
 
 TEST(DeviceBench, ACoatedDeviceHasDirectLightAndItsOwnContactPixels) {
-  BenchSettings settings;
+  BenchSettings settings = without_estimator();
   settings.force_error = 0.05;
   settings.pixel_error = 3.0;
   settings.most_pixels = 1000;
@@ -276,7 +283,7 @@ TEST(DeviceBench, ACoatedDeviceHasDirectLightAndItsOwnContactPixels) {
 TEST(DeviceBench, EventsComeNearerWithSmallerSteps) {
   sim::DeviceSpec device = dim_device();
   device.camera->events.emplace().pixels.dark_intensity = 10.0;
-  BenchSettings settings;
+  BenchSettings settings = without_estimator();
   settings.force_error = 0.1;
   settings.pixel_error = 5.0;
   settings.most_pixels = 1000;
@@ -292,7 +299,7 @@ TEST(DeviceBench, EventsComeNearerWithSmallerSteps) {
 TEST(DeviceBench, SaysThatPicturesFillTheWells) {
   sim::DeviceSpec device = dim_device();
   device.camera->exposure_us *= 1e3;
-  BenchSettings settings;
+  BenchSettings settings = without_estimator();
   settings.force_error = 0.2;  // coarse meshes, too, on which a ball stands on two or three vertices
   settings.finite_strain = false;
   settings.most_tetrahedra = kFewTetrahedra;
@@ -306,7 +313,7 @@ TEST(DeviceBench, WithoutACameraItIsAboutForces) {
   sim::DeviceSpec device = test::small_device();
   device.camera.reset();
   device.lamps.clear();
-  BenchSettings settings;
+  BenchSettings settings = without_estimator();
   settings.force_error = 0.05;
   settings.finite_strain = false;
   settings.most_tetrahedra = kFewTetrahedra;
