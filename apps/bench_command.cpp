@@ -1,6 +1,5 @@
 #include <spdlog/spdlog.h>
 
-#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -40,10 +39,9 @@ void print_estimator(const lab::DeviceBench& bench) {
     fmt::print("no estimator is measured: {}\n", found.none);
     return;
   }
-  const std::vector<double>& errors = found.reference.errors;
-  const auto [least, most] = std::minmax_element(errors.begin(), errors.end());
+  const auto [least, most] = found.reference.range();
   fmt::print("{} of the device's estimator, trained on {} frames as planned: {:.3g} to {:.3g} {} off\n", found.quantity,
-             found.reference.frames, *least, *most, found.unit);
+             found.reference.frames, least, most, found.unit);
 }
 
 void bench(const BenchOptions& options, const GlobalOptions& global) {

@@ -3,18 +3,16 @@
 #include <algorithm>
 
 #include "sim/need/scene_needs.h"
+#include "sim/need/switched_effect.h"
 
 namespace touchstone::datasets {
 namespace {
 
 /// What a plan may switch for a sensor: what it measures. Friction is always simulated, or touches without a drag would
 /// be of another kind.
-constexpr struct {
-  const char* name;
-  sim::Switch sim::EffectSwitches::*of;
-  bool sim::Plan::*planned;
-} kSwitched[] = {{"fine relief", &sim::EffectSwitches::fine_relief, &sim::Plan::fine_relief},
-                 {"interreflection", &sim::EffectSwitches::interreflection, &sim::Plan::interreflection}};
+constexpr sim::SwitchedEffect kSwitched[] = {
+    {"fine relief", &sim::EffectSwitches::fine_relief, &sim::Plan::fine_relief},
+    {"interreflection", &sim::EffectSwitches::interreflection, &sim::Plan::interreflection}};
 
 std::string key_of(const PreparedDraw& prepared, const PlannedDraw& one) {
   std::string key = fmt::format("draw, sample {}\n{}\n", one.sample, prepared.text);
@@ -46,7 +44,7 @@ std::vector<NeededDraw> plan_by_need(PreparedDraw& prepared, const std::filesyst
   }
   const auto finite = any_of(needed, [](const sim::Plan& plan) { return plan.finite_strain; });
   prepared.effects.elasticity = finite == sim::Switch::on ? sim::Elasticity::neo_hookean : sim::Elasticity::linear;
-  for (const auto& one : kSwitched) {
+  for (const sim::SwitchedEffect& one : kSwitched) {
     if (!seen || prepared.effects.*one.of != sim::Switch::automatic) continue;
     prepared.effects.*one.of = any_of(needed, [&](const sim::Plan& plan) { return plan.*one.planned; });
   }
@@ -56,7 +54,7 @@ std::vector<NeededDraw> plan_by_need(PreparedDraw& prepared, const std::filesyst
 std::string in_words(const sim::EffectSwitches& effects) {
   const bool finite = effects.elasticity == sim::Elasticity::neo_hookean;
   std::string words = finite ? "finite strain on" : "finite strain off";
-  for (const auto& one : kSwitched) {
+  for (const sim::SwitchedEffect& one : kSwitched) {
     const sim::Switch is = effects.*one.of;
     if (is != sim::Switch::automatic) words += fmt::format(", {} {}", one.name, is == sim::Switch::on ? "on" : "off");
   }

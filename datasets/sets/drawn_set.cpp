@@ -211,9 +211,6 @@ GenerateReport generate_draw(PreparedDraw prepared, const fs::path& out, const G
     report.was_finished = true;
     return report;
   }
-  for (const NeededDraw& one : plan_by_need(prepared, options.cache, progress)) {
-    for (const std::string& warning : one.plan.warnings) report.warn(warning);
-  }
   for (const PlannedDraw& one : planned_draws(prepared)) {
     report.warn(sim::size_doubt(one.scene.device, one.scene.object));
   }
@@ -221,6 +218,9 @@ GenerateReport generate_draw(PreparedDraw prepared, const fs::path& out, const G
   std::error_code error;
   fs::create_directories(out / "blocks", error);
   if (error) fail("{}: can't be made ({})", (out / "blocks").string(), error.message());
+  for (const NeededDraw& one : plan_by_need(prepared, options.cache, progress)) {
+    for (const std::string& warning : one.plan.warnings) report.warn(warning);
+  }
   if (options.predicted) predict(prepared, folder, options, progress);
   std::unique_ptr<UnitSensor> sensor;
   std::optional<DrawnUnit> unit;

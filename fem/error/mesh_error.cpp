@@ -20,8 +20,8 @@ using Eigen::Vector3d;
 
 /// Contact radii over the edge.
 constexpr std::array<double, 5> kRadii = {1.6, 2.25, 3.2, 4.5, 6.0};
-/// So many are pressed also where the fine part of the mesh ends before.
-constexpr int kLeastRadii = 2;
+/// So many say something also where the fine part of the mesh ends before.
+constexpr std::size_t kLeastRadii = 2;
 /// Where the object is put, in edges: places that are unlike each other in a lattice of triangles.
 constexpr std::array<std::array<double, 2>, 6> kPlaces = {
     {{0.026, 0.042}, {0.26, 0.14}, {0.54, 0.38}, {0.12, 0.62}, {-0.38, 0.22}, {0.44, -0.26}}};
@@ -274,8 +274,10 @@ BodyErrors measure_body(const std::vector<Level>& levels, const LadderGel& ladde
   BodyErrors result;
   std::array<std::vector<Sample>, kErrorKinds> samples;
   std::array<std::vector<double>, kErrorKinds> stiffness;  // of forces, at each radius
-  for (int r = 0; r < ladder_radii(ladder); ++r) {
-    const double radius = kRadii[static_cast<std::size_t>(r)];
+  const auto least = static_cast<std::size_t>(ladder_radii(ladder));
+  for (std::size_t r = 0; r < kRadii.size(); ++r) {
+    if (r >= least && result.radius_per_edge.size() >= kLeastRadii) break;
+    const double radius = kRadii[r];
     std::array<ReferenceBody, kPlaces.size()> bodies;
     std::array<Vector3d, kPlaces.size()> places;
     for (std::size_t k = 0; k < places.size(); ++k) {
@@ -399,7 +401,7 @@ std::vector<double> ladder_factors(double largest_factor) {
 int ladder_radii(const LadderGel& ladder) {
   const auto beyond = std::count_if(kRadii.begin(), kRadii.end(),
                                     [&](double radius) { return radius * ladder.edge > ladder.largest_radius; });
-  return std::max(kLeastRadii, static_cast<int>(kRadii.size()) - static_cast<int>(beyond));
+  return static_cast<int>(std::max(kLeastRadii, kRadii.size() - static_cast<std::size_t>(beyond)));
 }
 
 MeshErrorTable measure_mesh_error(const Compliance& gel, const LadderGel& ladder, const Progress& progress) {

@@ -34,7 +34,7 @@ struct LadderGel {
 /// as coarsely. `largest_factor` as LadderGel's.
 std::vector<double> ladder_factors(double largest_factor);
 
-/// On how many radii bodies are pressed, on each of the ladder's gels.
+/// On how many radii bodies are pressed, on each of the ladder's gels; more where one of them finds no contact.
 int ladder_radii(const LadderGel& ladder);
 
 /// The ladder of a gel: radii as far as its fine part goes, edges up to its thickness.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <numeric>
 
 #include "core/error.h"
 #include "core/seconds_since.h"
@@ -75,6 +76,14 @@ double root_mean_square(double squares, std::size_t count) {
 
 // Heights of a coated gel.
 
+/// Of heights that were estimated, beside the touch's.
+double height_rms_um(const sensors::HeightResult& estimated, const TouchFrame& touch, double mm_per_px) {
+  sim::Touch truth;
+  truth.height = touch.height;
+  truth.contact = touch.contact;
+  return height_error(estimated, truth, mm_per_px).rms_um;
+}
+
 Trained train_heights(const sim::DeviceSpec& device, double ball_radius_mm, const FrameSet& training, std::size_t first,
                       std::size_t count, const FrameSet& test) {
   std::vector<sensors::BallPress> presses;
@@ -95,11 +104,8 @@ Trained train_heights(const sim::DeviceSpec& device, double ball_radius_mm, cons
   sensors::HeightEstimator estimator(made.model);
   double squares = 0.0;
   for (const TouchFrame& touch : test.touches) {
-    sim::Touch truth;
-    truth.height = touch.height;
-    truth.contact = touch.contact;
-    const HeightError error = height_error(estimator.estimate(touch.frame), truth, test.mm_per_px);
-    squares += error.rms_um * error.rms_um;
+    const double rms_um = height_rms_um(estimator.estimate(touch.frame), touch, test.mm_per_px);
+    squares += rms_um * rms_um;
   }
   const auto flawed = [](const sensors::PressUse& use) { return !use.flaw.empty(); };
   return {root_mean_square(squares, test.touches.size()),
@@ -112,11 +118,8 @@ double typical_height_um(const FrameSet& test) {
     sensors::HeightResult flat;
     flat.height_mm = cv::Mat(touch.height.size(), CV_32F, cv::Scalar(0));
     flat.contact = cv::Mat(touch.height.size(), CV_8U, cv::Scalar(0));
-    sim::Touch truth;
-    truth.height = touch.height;
-    truth.contact = touch.contact;
-    const double rms = height_error(flat, truth, test.mm_per_px).rms_um;
-    squares += rms * rms;
+    const double rms_um = height_rms_um(flat, touch, test.mm_per_px);
+    squares += rms_um * rms_um;
   }
   return root_mean_square(squares, test.touches.size());
 }
@@ -354,6 +357,15 @@ void keep_rows(const std::vector<std::string>& names, std::vector<Trial>& trials
 
 }  // namespace
 
+double EstimatorRow::mean() const {
+  return std::accumulate(errors.begin(), errors.end(), 0.0) / static_cast<double>(errors.size());
+}
+
+std::pair<double, double> EstimatorRow::range() const {
+  const auto [least, most] = std::minmax_element(errors.begin(), errors.end());
+  return {*least, *most};
+}
+
 void check(const EstimatorSettings& settings) {
   const auto even = [](const char* field, int value, int least) {
     if (value < least || value % 2 != 0) {
@@ -495,8 +507,7 @@ EstimatorBench bench_estimator(const EstimatorDevice& of, const EstimatorSetting
   bench.training = family.words;
   bench.test = fmt::format(
       "{} frames of {}, {:.3g} to {:.3g} mm deep up to {:.3g} x {:.3g} mm from the gel's middle, pressed and dragged "
-      "by a third "
-      "of "
+      "by a third of "
       "the depth, with everything on ({}), on the device's own mesh, of another unit and other presses than any "
       "training frame",
       test.touches.size(), of.object.name, 0.5 * of.depth_mm, 2.0 * of.depth_mm, family.reach_mm.x(),

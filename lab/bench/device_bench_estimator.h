@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/progress.h"
@@ -42,6 +43,11 @@ struct EstimatorRow {
   int left_out = 0;            ///< training frames of all sets that the estimator couldn't use
   std::string light;           ///< how its frames were lit
   std::string note;            ///< why there are no errors
+
+  /// Of the training sets. @pre there are errors
+  double mean() const;
+  /// Least and most of them. @pre there are errors
+  std::pair<double, double> range() const;
 };
 
 /// What the device's own estimator errs by on frames with everything on, against how its training frames were made.

@@ -70,7 +70,7 @@ std::string sentences(const EstimatorBench& bench) {
 std::string line_of(const EstimatorBench& bench, const EstimatorRow& row, bool bold) {
   const std::string name = bold ? fmt::format("**{}**", row.name) : row.name;
   if (row.errors.empty()) return fmt::format("| {} | {} | | | | | | {} |\n", name, row.frames, row.note);
-  const double mean = mean_of(row.errors);
+  const double mean = row.mean();
   const std::string left_out = row.left_out == 0
                                    ? ""
                                    : fmt::format("; {} of {} frames couldn't be used", row.left_out,
@@ -88,16 +88,14 @@ std::string table_head(const EstimatorBench& bench) {
 }
 
 /// A mark at the mean, and a dashed line over the sets.
-void add_point(const EstimatorRow& row, double x, std::size_t colour, const std::string& name, const std::string& label,
-               plots::LinePlot& plot) {
-  const auto [least, most] = std::minmax_element(row.errors.begin(), row.errors.end());
+void add_point(const EstimatorRow& row, double x, std::size_t colour, const std::string& label, plots::LinePlot& plot) {
+  const auto [least, most] = row.range();
   plots::PlotCurve mark;
-  mark.name = name;
-  mark.points = {{x, mean_of(row.errors)}};
+  mark.points = {{x, row.mean()}};
   mark.colour = colour;
   mark.labels = {label};
   plots::PlotCurve range;
-  range.points = {{x, *least}, {x, *most}};
+  range.points = {{x, least}, {x, most}};
   range.dashed = true;
   range.colour = colour;
   plot.curves.push_back(mark);
@@ -128,12 +126,12 @@ plots::LinePlot plot_of_rows(const EstimatorBench& bench) {
   plot.x_label = "a training frame, seconds of a core";
   plot.y_label = fmt::format("error on frames with everything on, {}", bench.unit);
   std::vector<std::string> groups = {bench.reference.group};
-  add_point(bench.reference, bench.reference.each_s, 0, {}, bench.reference.name, plot);
+  add_point(bench.reference, bench.reference.each_s, 0, bench.reference.name, plot);
   for (const EstimatorRow& row : bench.rows) {
     if (row.errors.empty()) continue;
     auto group = std::find(groups.begin(), groups.end(), row.group);
     if (group == groups.end()) group = groups.insert(group, row.group);
-    add_point(row, row.each_s, static_cast<std::size_t>(group - groups.begin()), {}, row.name, plot);
+    add_point(row, row.each_s, static_cast<std::size_t>(group - groups.begin()), row.name, plot);
   }
   choose_axes(plot);
   return plot;
@@ -148,8 +146,8 @@ plots::LinePlot plot_of_counts(const EstimatorBench& bench) {
   line.colour = 0;
   for (const EstimatorRow& row : bench.counts) {
     if (row.errors.empty()) continue;
-    add_point(row, row.frames, 0, {}, {}, plot);
-    line.points.emplace_back(row.frames, mean_of(row.errors));
+    add_point(row, row.frames, 0, {}, plot);
+    line.points.emplace_back(row.frames, row.mean());
   }
   plot.curves.push_back(line);
   choose_axes(plot);

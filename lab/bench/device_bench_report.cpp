@@ -4,7 +4,6 @@
 #include <cmath>
 #include <initializer_list>
 #include <iterator>
-#include <numeric>
 #include <optional>
 #include <thread>
 
@@ -97,9 +96,8 @@ std::string csv_of(const DeviceBench& bench) {
     if (row.errors.empty()) {
       add({kUnknown, kUnknown, kUnknown});
     } else {
-      const auto [least, most] = std::minmax_element(row.errors.begin(), row.errors.end());
-      const double sum = std::accumulate(row.errors.begin(), row.errors.end(), 0.0);
-      add({sum / static_cast<double>(row.errors.size()), *least, *most});
+      const auto [least, most] = row.range();
+      add({row.mean(), least, most});
     }
     csv += fmt::format(",{},{}\n", bench.estimator->unit, note(row.note));
   };

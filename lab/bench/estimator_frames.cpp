@@ -42,13 +42,7 @@ class PixelTruth {
     const sim::SeenGeometry seen = view_.geometry(press, view_.relief(press));
     const std::vector<render::FirstHit> hits = render::first_hits(seen.inside, ready_);
     touch.height = sim::pressed_in(rest_hits_, hits, touch.frame.size());
-    touch.contact = cv::Mat(touch.frame.size(), CV_8U, cv::Scalar(0));
-    for (std::size_t i = 0; i < hits.size(); ++i) {
-      if (hits[i].object != 0 || rest_hits_[i].object != 0) continue;
-      if (seen.sheet.touched[static_cast<std::size_t>(hits[i].triangle)] >= 0) {
-        touch.contact.ptr<std::uint8_t>()[i] = 255;
-      }
-    }
+    touch.contact = sim::in_contact(rest_hits_, hits, seen.sheet, touch.frame.size());
   }
 
   double mm_per_px() const {

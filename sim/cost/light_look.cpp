@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
+#include <optional>
 
 #include "core/error.h"
 #include "render/paths/shared_paths.h"
@@ -101,9 +102,6 @@ class Look {
 
   /// False if it won't be taken.
   bool direct(LightLook& found) {
-    Plan plain = view_.plan;
-    plain.interreflection = false;  // the light at rest is counted, not traced
-    const SceneView plain_view(view_.scene, plain, gel_, view_);
     try {
       WorkClock clock;
       const DirectWork work = count_direct_work(view_, camera_, truths_, relief_);
@@ -114,12 +112,17 @@ class Look {
       const double paths_s = (work.rest_paths + work.error_paths) * path;
       const bool quick = found.set_up_s + paths_s < kLongestLook_s;
       // Where that is quick, light is found as the run will find it; else on a coarse field, without bounced light.
-      const SceneView& tried = quick ? view_ : plain_view;
+      std::optional<SceneView> plain;
+      if (!quick) {
+        Plan without = view_.plan;
+        without.interreflection = false;
+        plain.emplace(view_.scene, without, gel_, view_);
+      }
       DirectLightSettings wanted;
       wanted.field_accuracy = quick ? 0.0 : kLookAccuracy;
       wanted.relief = &relief_;
       const WorkClock finding;
-      const DirectLight light(tried, camera_, truths_, wanted);
+      const DirectLight light(plain ? *plain : view_, camera_, truths_, wanted);
       if (quick) {
         found.set_up_s = finding.seconds();
       } else {

@@ -19,7 +19,7 @@ struct MachineRates {
   double speed_up = 1.0;        ///< so many times one thread's work at a time, of work that is cut into frames
 };
 
-/// Measures them, with `threads` threads (0: as many as the machine has): some five seconds.
+/// Measures them, with `threads` threads (0: as many as the machine has): some ten seconds.
 MachineRates measure_rates(int threads);
 
 /// What the rates depend on: the processor, BLAS's kernels, threads, and how they are measured.

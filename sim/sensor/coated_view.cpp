@@ -212,13 +212,7 @@ class CoatedView final : public SensorView {
     if (lacking_) touch.light = lacking_->corrected(touch.light, height);
     if (!truth) return touch;
     touch.height = height;
-    touch.contact = cv::Mat(height.size(), CV_8U, cv::Scalar(0));
-    for (std::size_t i = 0; i < hits.size(); ++i) {
-      const render::FirstHit& now = hits[i];
-      const render::FirstHit& before = rest_hits_[i];
-      if (now.object != 0 || before.object != 0) continue;
-      if (seen.sheet.touched[static_cast<std::size_t>(now.triangle)] >= 0) touch.contact.ptr<std::uint8_t>()[i] = 255;
-    }
+    touch.contact = in_contact(rest_hits_, hits, seen.sheet, height.size());
     return touch;
   }
 

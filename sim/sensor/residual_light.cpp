@@ -124,4 +124,15 @@ cv::Mat pressed_in(const std::vector<render::FirstHit>& rest, const std::vector<
   return height;
 }
 
+cv::Mat in_contact(const std::vector<render::FirstHit>& rest, const std::vector<render::FirstHit>& now,
+                   const GelSheet& sheet, cv::Size size) {
+  TS_ASSERT(rest.size() == now.size() && now.size() == static_cast<std::size_t>(size.area()));
+  cv::Mat contact(size, CV_8U, cv::Scalar(0));
+  for (std::size_t i = 0; i < now.size(); ++i) {
+    if (now[i].object != 0 || rest[i].object != 0) continue;
+    if (sheet.touched[static_cast<std::size_t>(now[i].triangle)] >= 0) contact.ptr<std::uint8_t>()[i] = 255;
+  }
+  return contact;
+}
+
 }  // namespace touchstone::sim

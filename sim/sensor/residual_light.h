@@ -9,6 +9,7 @@
 #include "render/cameras/first_hits.h"
 #include "render/imager/imager.h"
 #include "sim/scene/residual_map.h"
+#include "sim/view/visible_gel.h"
 
 namespace touchstone::sim {
 
@@ -43,5 +44,8 @@ class ResidualLight {
 
 /// How far what each pixel sees is pressed in: Touch::height. @pre both have a hit a pixel; surface 0 is the membrane
 cv::Mat pressed_in(const std::vector<render::FirstHit>& rest, const std::vector<render::FirstHit>& now, cv::Size size);
+/// Which pixels see membrane that lies on an object: Touch::contact. `sheet` is the membrane of `now`. @pre likewise
+cv::Mat in_contact(const std::vector<render::FirstHit>& rest, const std::vector<render::FirstHit>& now,
+                   const GelSheet& sheet, cv::Size size);
 
 }  // namespace touchstone::sim
