@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <limits>
@@ -29,6 +30,7 @@ constexpr double kLeastShrink = 0.2;  // of the least J in one Newton step
 constexpr double kLeastRatio = 0.1;   // J: below, elements deform as the gel can't
 constexpr double kBalanced = 1e-8;    // residual over the elements' forces
 constexpr double kAtRest = 1e-4;      // of the elements' forces at a part's start: below, a gel is as good as at rest
+constexpr int kFacePasses = 3;        // over an elastic object's face
 constexpr double kReach = 0.5;        // of a vertex's own size: open gaps below this are candidates
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -42,6 +44,31 @@ Eigen::Matrix3d axes_along(const Eigen::Vector3d& direction) {
   Eigen::Matrix3d axes;
   axes << first, second, first.cross(second);
   return axes;
+}
+
+/// The gradients along a surface of what its corners have, as means over the triangles about each.
+Eigen::MatrixX3d vertex_slopes(const std::vector<Eigen::Vector3d>& corners,
+                               const std::vector<std::array<Eigen::Index, 3>>& triangles,
+                               const Eigen::VectorXd& values) {
+  Eigen::MatrixX3d slopes = Eigen::MatrixX3d::Zero(values.size(), 3);
+  Eigen::VectorXd areas = Eigen::VectorXd::Zero(values.size());
+  for (const auto& t : triangles) {
+    const Eigen::Vector3d twice_area = (corners[t[1]] - corners[t[0]]).cross(corners[t[2]] - corners[t[0]]);
+    const double size = twice_area.norm();
+    if (!(size > 0.0)) continue;
+    Eigen::Vector3d slope = Eigen::Vector3d::Zero();  // times the size
+    for (int k = 0; k < 3; ++k) {
+      slope += values[t[k]] / size * twice_area.cross(corners[t[(k + 2) % 3]] - corners[t[(k + 1) % 3]]);
+    }
+    for (const Eigen::Index k : t) {
+      slopes.row(k) += slope.transpose();
+      areas[k] += size;
+    }
+  }
+  for (Eigen::Index k = 0; k < values.size(); ++k) {
+    if (areas[k] > 0.0) slopes.row(k) /= areas[k];
+  }
+  return slopes;
 }
 
 std::vector<int> forced_axes(const PartTarget& target) {
@@ -86,10 +113,29 @@ Eigen::MatrixX3d bulge_forces(const FiniteGel& gel, const FiniteSnapshot& at) {
   return forces;
 }
 
+Eigen::Vector3d traction_at(const FiniteGel& gel, const FiniteSnapshot& at, int vertex) {
+  return at.pressure[vertex] * at.gap.direction.row(vertex).transpose() / gel.rest.weight[vertex] +
+         at.shear.row(vertex).transpose();
+}
+
+/// An elastic object's own compliance, seen by the hats of some vertices where the gel's surface is.
+struct FinitePartSolver::Soft {
+  std::vector<int> vertices;                           ///< rising
+  std::vector<std::array<Eigen::Index, 3>> triangles;  ///< of the surface, between them: places in `vertices`
+  Eigen::MatrixXd compliance;                          ///< 3 m x 3 m, mm^3 per MPa, gel frame
+
+  Eigen::Index place(int vertex) const {
+    const auto it = std::lower_bound(vertices.begin(), vertices.end(), vertex);
+    return it != vertices.end() && *it == vertex ? it - vertices.begin() : -1;
+  }
+};
+
 /// One Newton iterate, and what is known there.
 struct FinitePartSolver::Iterate {
   FiniteSnapshot at;
   GapLines lines;
+  std::shared_ptr<const Soft> soft;                  ///< of an elastic object, along these lines
+  Eigen::MatrixX3d face;                             ///< n x 3, likewise: how what it gives changes along the surface
   std::vector<Eigen::Matrix3d> axes;                 ///< per vertex; only where it has a gap
   Eigen::VectorXd inside;                            ///< residual without the tractions of contact
   Eigen::Vector3d bulges = Eigen::Vector3d::Zero();  ///< sum of bulge_forces, N
@@ -108,28 +154,28 @@ struct FinitePartSolver::Step {
   Eigen::VectorXd change;
 };
 
-/// A block's laws as they are at an iterate, c rows a vertex.
+/// A block's laws as they are at an iterate, as in LawRows.
 struct FinitePartSolver::Now {
   Eigen::VectorXd opening;    ///< gaps and slips, mm^3
   Eigen::VectorXd traction;   ///< MPa
   std::vector<int> rows;      ///< where each is in the tangent's compliance
-  std::vector<int> held;      ///< rows of what touches
+  std::vector<int> held;      ///< rows of what touches, and the shifts, if anything does
   Eigen::VectorXd stiffness;  ///< of the hold of each of these
 };
 
-FinitePartSolver::FinitePartSolver(const FiniteGel& gel, ContactShape shape, double friction, PressTolerance tolerance)
+FinitePartSolver::FinitePartSolver(const FiniteGel& gel, PressBody body, PressTolerance tolerance)
     : gel_(gel),
-      shape_(std::move(shape)),
-      friction_(friction),
+      body_(std::move(body)),
+      soft_(body_.elastic ? std::make_unique<ElasticBody>(*body_.elastic) : nullptr),
       tolerance_(tolerance),
       n_(static_cast<int>(gel.rest.vertices.size())) {}
 
 double FinitePartSolver::overlap(const RigidTransform& pose) const {
-  return -deepest_gap(gel_.rest, shape_, pose);
+  return -deepest_gap(gel_.rest, body_.shape, pose);
 }
 
 double FinitePartSolver::tip_overlap(const RigidTransform& pose) const {
-  return -tip_gap(gel_.rest, shape_, pose);
+  return -tip_gap(gel_.rest, body_.shape, pose);
 }
 
 /// Gap, forces and residual at the iterate's state; along the lines given, or new ones.
@@ -137,19 +183,21 @@ void FinitePartSolver::evaluate(const GapLines* held, Iterate& iterate, PartEffo
   FiniteSnapshot& at = iterate.at;
   const double depth = std::max(0.0, overlap(at.pose));
   if (held == nullptr) {
-    iterate.lines = gap_lines(gel_.space, gel_.outer, at.elastic.displacement, shape_, at.pose, depth);
+    iterate.lines = gap_lines(gel_.space, gel_.outer, at.elastic.displacement, body_.shape, at.pose, depth);
   }
-  at.gap = deformed_gap(gel_.space, gel_.outer, gel_.rest.weight, iterate.lines, at.elastic.displacement, shape_,
+  at.gap = deformed_gap(gel_.space, gel_.outer, gel_.rest.weight, iterate.lines, at.elastic.displacement, body_.shape,
                         at.pose, depth, at.pressure);
   ++effort.geometry_updates;
+  for (int v = 0; v < n_; ++v) {
+    if (std::isfinite(at.gap.weighted[v])) continue;
+    at.pressure[v] = 0.0;
+    at.shear.row(v).setZero();
+    at.state[v] = NodeState::open;
+  }
+  if (soft_) give_way(held == nullptr, iterate);
   iterate.axes.resize(n_);
   for (int v = 0; v < n_; ++v) {
-    if (!std::isfinite(at.gap.weighted[v])) {
-      at.pressure[v] = 0.0;
-      at.shear.row(v).setZero();
-      at.state[v] = NodeState::open;
-      continue;
-    }
+    if (!std::isfinite(at.gap.weighted[v])) continue;
     iterate.axes[v] = axes_along(at.gap.direction.row(v));
     // The frame turns with the gel, and the traction with it.
     const Eigen::Vector3d normal = iterate.axes[v].col(0);
@@ -164,6 +212,115 @@ void FinitePartSolver::evaluate(const GapLines* held, Iterate& iterate, PartEffo
   iterate.inside = residual.values - over_unknowns(gel_, bulges);
   iterate.size = std::max({residual.scale, outside.norm(), iterate.least_size});
   iterate.balance = iterate.size > 0.0 ? (iterate.inside - outside).norm() / iterate.size : 0.0;
+}
+
+/// What the object's surface gives way under the iterate's tractions, and the gaps from where it is then. Gel and
+/// object meet where the gel's deformed surface is, along its normals; as the gap's lines, that stays near the answer.
+/// What is given changes along the surface: so much is the object's face turned, and contact acts along it. Without
+/// that the force isn't the derivative of the stored energy (6 % off with a ball as soft as the gel, a third of the gel
+/// deep, on any mesh).
+void FinitePartSolver::give_way(bool anew, Iterate& iterate) const {
+  FiniteSnapshot& at = iterate.at;
+  const auto place_of = [&](int v) -> Eigen::Vector3d {
+    return gel_.rest.vertices[v] + at.elastic.displacement.row(gel_.outer.mesh_vertex[v]).transpose();
+  };
+  std::vector<int> wanted = with_those_beside(at, candidates(at));
+  const bool covered = iterate.soft && std::includes(iterate.soft->vertices.begin(), iterate.soft->vertices.end(),
+                                                     wanted.begin(), wanted.end());
+  if (anew || !covered) {
+    ContactSurface deformed = gel_.rest;
+    for (int v = 0; v < n_; ++v) deformed.vertices[v] = place_of(v);
+    deformed.normals = iterate.lines.normals;
+    const auto m = static_cast<Eigen::Index>(wanted.size());
+    auto soft = std::make_shared<Soft>();
+    soft->vertices = std::move(wanted);
+    soft->compliance = Eigen::MatrixXd::Zero(3 * m, 3 * m);
+    for (const auto& t : gel_.rest.triangles) {
+      const std::array<Eigen::Index, 3> places = {soft->place(t[0]), soft->place(t[1]), soft->place(t[2])};
+      if (*std::min_element(places.begin(), places.end()) >= 0) soft->triangles.push_back(places);
+    }
+    soft_->add_to(soft->compliance, 1.0, deformed, soft->vertices, std::vector<char>(soft->vertices.size(), 1),
+                  std::vector<Eigen::Matrix3d>(soft->vertices.size(), Eigen::Matrix3d::Identity()), at.pose, {},
+                  nullptr);
+    iterate.soft = std::move(soft);
+  }
+  const Soft& soft = *iterate.soft;
+  const auto m = std::ssize(soft.vertices);
+  const auto give = [&] {
+    Eigen::VectorXd tractions(3 * m);
+    for (Eigen::Index k = 0; k < m; ++k) tractions.segment<3>(3 * k) = traction_at(gel_, at, soft.vertices[k]);
+    const Eigen::VectorXd given = soft.compliance * tractions;
+    at.given = Eigen::MatrixX3d::Zero(n_, 3);
+    for (Eigen::Index k = 0; k < m; ++k) at.given.row(soft.vertices[k]) = given.segment<3>(3 * k).transpose();
+  };
+  const Eigen::MatrixX3d rigid = at.gap.direction;
+  if (anew) {
+    std::vector<Eigen::Vector3d> corners;
+    for (const int v : soft.vertices) corners.push_back(place_of(v));
+    // What is given and how the face turns depend on each other, weakly.
+    for (int pass = 0; pass < kFacePasses; ++pass) {
+      give();
+      Eigen::VectorXd along(m);  // mm
+      for (Eigen::Index k = 0; k < m; ++k) {
+        const int v = soft.vertices[k];
+        const double weight = gel_.rest.weight[v];
+        along[k] = at.gap.direction.row(v).dot(at.given.row(v)) / (weight * weight);
+      }
+      const Eigen::MatrixX3d slopes = vertex_slopes(corners, soft.triangles, along);
+      iterate.face = Eigen::MatrixX3d::Zero(n_, 3);
+      for (Eigen::Index k = 0; k < m; ++k) iterate.face.row(soft.vertices[k]) = slopes.row(k);
+      at.gap.direction = rigid + gel_.rest.weight.asDiagonal() * iterate.face;
+    }
+  } else {
+    at.gap.direction += gel_.rest.weight.asDiagonal() * iterate.face;
+  }
+  give();
+  std::vector<Eigen::Triplet<double>> turned;
+  for (const int v : soft.vertices) {
+    at.gap.weighted[v] += at.gap.direction.row(v).dot(at.given.row(v)) / gel_.rest.weight[v];
+    for (RowSparse::InnerIterator it(gel_.coupling, v); it; ++it) {
+      for (int a = 0; a < 3; ++a) turned.emplace_back(v, 3 * it.col() + a, it.value() * iterate.face(v, a));
+    }
+  }
+  RowSparse by_face(at.gap.gradient.rows(), at.gap.gradient.cols());
+  by_face.setFromTriplets(turned.begin(), turned.end());
+  at.gap.gradient += by_face;
+}
+
+/// Adds the object's part for the block's rows of laws, as many a vertex as in LawRows. @pre an elastic object, which
+/// the iterate's `soft` covers
+void FinitePartSolver::add_given(const Iterate& iterate, const std::vector<int>& block, int components,
+                                 Eigen::MatrixXd& compliance) const {
+  const Soft& soft = *iterate.soft;
+  const auto m = std::ssize(block);
+  const Eigen::Index c = components;
+  std::vector<Eigen::Matrix3d> laws;  // rows: how the vertex's gap and slips change with what is given there
+  std::vector<Eigen::Index> places;
+  for (const int v : block) {
+    Eigen::Matrix3d rows = iterate.axes[v].transpose();
+    rows.row(0) = iterate.at.gap.direction.row(v) / gel_.rest.weight[v];
+    laws.push_back(rows);
+    places.push_back(soft.place(v));
+  }
+  for (Eigen::Index j = 0; j < m; ++j) {
+    for (Eigen::Index i = 0; i < m; ++i) {
+      const Eigen::Matrix3d own = soft.compliance.block<3, 3>(3 * places[i], 3 * places[j]);
+      compliance.block(c * i, c * j, c, c) += (laws[i] * own * laws[j].transpose()).topLeftCorner(c, c);
+    }
+  }
+}
+
+/// These and the vertices beside them that have a gap, rising.
+std::vector<int> FinitePartSolver::with_those_beside(const FiniteSnapshot& at, std::vector<int> vertices) const {
+  const std::size_t own = vertices.size();
+  for (std::size_t k = 0; k < own; ++k) {
+    for (const int u : gel_.rest.around[vertices[k]]) {
+      if (std::isfinite(at.gap.weighted[u])) vertices.push_back(u);
+    }
+  }
+  std::sort(vertices.begin(), vertices.end());
+  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+  return vertices;
 }
 
 /// Vertices in contact and around it, and those that nearly touch.
@@ -194,6 +351,8 @@ Eigen::Vector2d FinitePartSolver::slid(const FiniteSnapshot& from, const FiniteS
     const Eigen::Vector3d is = place + at.elastic.displacement.row(node).transpose();
     slip += it.value() * (is - motion * was);
   }
+  if (at.given.rows() > 0) slip += at.given.row(vertex).transpose();
+  if (from.given.rows() > 0) slip -= motion.turn(from.given.row(vertex).transpose());
   return axes.rightCols<2>().transpose() * slip;
 }
 
@@ -211,12 +370,12 @@ double FinitePartSolver::error_of(const FiniteSnapshot& from, const PartTarget& 
       continue;
     }
     error = std::max(error, std::abs(gap) / tolerance_.lookup_mm);
-    if (friction_ == 0.0) continue;
+    if (body_.friction == 0.0) continue;
     if (!(iterate.tangential_scale[v] > 0.0)) return kInfinity;
     // The laws of friction as a projection, as in contact_solver.h.
     const Eigen::Vector2d t = iterate.axes[v].rightCols<2>().transpose() * at.shear.row(v).transpose();
     Eigen::Vector2d kept = t - slid(from, at, v, iterate.axes[v]) / iterate.tangential_scale[v];
-    const double limit = friction_ * std::max(0.0, at.pressure[v]);
+    const double limit = body_.friction * std::max(0.0, at.pressure[v]);
     if (kept.norm() > limit) kept *= limit / kept.norm();
     error = std::max(error, (t - kept).norm() / (largest * std::max(1e-6, 100.0 * tolerance_.traction)));
   }
@@ -236,13 +395,7 @@ bool FinitePartSolver::cover(const PartTarget& target, const Iterate& iterate, c
                       std::back_inserter(missing));
   if (missing.empty()) return true;
   if (kRowsAFactor < tangent_->components * std::ssize(missing)) return false;
-  // With what will be next.
-  const std::size_t own = missing.size();
-  for (std::size_t k = 0; k < own; ++k) {
-    for (const int u : gel_.rest.around[missing[k]]) {
-      if (std::isfinite(iterate.at.gap.weighted[u])) missing.push_back(u);
-    }
-  }
+  missing = with_those_beside(iterate.at, std::move(missing));  // what will be next
   tangent_ =
       std::make_shared<const FiniteTangent>(with_vertices(*tangent_, gel_, iterate.at.gap, iterate.axes, missing));
   return true;
@@ -251,18 +404,10 @@ bool FinitePartSolver::cover(const PartTarget& target, const Iterate& iterate, c
 /// Makes the tangent at the iterate, for its candidates and those beside them. False: why_not_ says why.
 bool FinitePartSolver::factorise(const PartTarget& target, const Iterate& iterate, PartEffort& effort) {
   tangent_.reset();
-  std::vector<int> block = candidates(iterate.at);
-  const std::size_t own = block.size();
-  for (std::size_t k = 0; k < own; ++k) {
-    for (const int u : gel_.rest.around[block[k]]) {
-      if (std::isfinite(iterate.at.gap.weighted[u])) block.push_back(u);
-    }
-  }
-  std::sort(block.begin(), block.end());
-  block.erase(std::unique(block.begin(), block.end()), block.end());
+  std::vector<int> block = with_those_beside(iterate.at, candidates(iterate.at));
   try {
-    tangent_ = std::make_shared<const FiniteTangent>(
-        finite_tangent(gel_, iterate.at, iterate.axes, std::move(block), friction_ > 0.0 ? 3 : 1, forced_axes(target)));
+    tangent_ = std::make_shared<const FiniteTangent>(finite_tangent(gel_, iterate.at, iterate.axes, std::move(block),
+                                                                    body_.friction > 0.0 ? 3 : 1, forced_axes(target)));
   } catch (const Error& singular) {
     why_not_ = singular.what();
     return false;
@@ -277,7 +422,9 @@ FinitePartSolver::Now FinitePartSolver::now_at(const FiniteSnapshot& from, const
   const FiniteSnapshot& at = iterate.at;
   const int c = tangent_->components;
   const auto m = static_cast<Eigen::Index>(block.size());
-  Now now{Eigen::VectorXd(c * m), Eigen::VectorXd(c * m), {}, {}, Eigen::VectorXd(c * m)};
+  const auto shifts = std::ssize(tangent_->forced);
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(c * m + shifts);
+  Now now{none, none, {}, {}, none};
   for (Eigen::Index j = 0; j < m; ++j) {
     const int v = block[static_cast<std::size_t>(j)];
     const auto place = std::lower_bound(tangent_->block.begin(), tangent_->block.end(), v) - tangent_->block.begin();
@@ -293,6 +440,13 @@ FinitePartSolver::Now FinitePartSolver::now_at(const FiniteSnapshot& from, const
       now.stiffness[std::ssize(now.held)] = hold_stiffness(gel_, v);
       now.held.push_back(static_cast<int>(c * j + t));
     }
+  }
+  const bool touches = !now.held.empty();
+  for (Eigen::Index b = 0; b < shifts; ++b) {
+    now.rows.push_back(static_cast<int>(c * std::ssize(tangent_->block) + b));
+    if (!touches) continue;
+    now.stiffness[std::ssize(now.held)] = shift_release(gel_);
+    now.held.push_back(static_cast<int>(c * m + b));
   }
   now.stiffness.conservativeResize(std::ssize(now.held));
   return now;
@@ -323,6 +477,7 @@ bool FinitePartSolver::find_step(const FiniteSnapshot& from, const PartTarget& t
   // Where gel and object would go with the tractions that there are, and from there without them.
   const Eigen::VectorXd back = tangent_->factor->solve(right);
   ContactLaws free{tangent_->compliance(now.rows, now.rows), now.opening};
+  if (soft_) add_given(iterate, step.block, c, free.compliance);
   for (std::size_t r = 0; r < laws.rows.size(); ++r) {
     for (const auto& [i, x] : laws.rows[r]) free.ahead[static_cast<Eigen::Index>(r)] += length * x * back[i];
   }
@@ -330,9 +485,10 @@ bool FinitePartSolver::find_step(const FiniteSnapshot& from, const PartTarget& t
   const ContactLaws stiff = held_stiffly(free, now.held, now.stiffness);
   const Eigen::VectorXd& ahead = stiff.ahead;
   ContactProblem contact;
-  contact.compliance.emplace(stiff.compliance);
+  const Eigen::MatrixXd of_vertices = stiff.compliance.topLeftCorner(c * m, c * m);
+  contact.compliance.emplace(of_vertices);
   contact.components = c;
-  contact.friction = Eigen::VectorXd::Constant(m, friction_);
+  contact.friction = Eigen::VectorXd::Constant(m, body_.friction);
   contact.gap.resize(m);
   contact.border.resize(c * m, 0);
   if (c == 3) contact.drag.resize(2 * m);
@@ -345,7 +501,7 @@ bool FinitePartSolver::find_step(const FiniteSnapshot& from, const PartTarget& t
     const auto scale = [&](Eigen::Index row) { return stiff.compliance(row, row); };
     iterate.tangential_scale[v] = std::max(scale(c * j + 1), scale(c * j + 2));
   }
-  const Eigen::VectorXd start = at.touching ? now.traction : Eigen::VectorXd();
+  const Eigen::VectorXd start = at.touching ? Eigen::VectorXd(now.traction.head(c * m)) : Eigen::VectorXd();
   ContactMemory memory;
   step.answer = c == 1 ? solve_frictionless(contact, start, memory)
                        : solve_frictional(contact, start, std::max(tolerance_.traction, 1e-10), memory);
@@ -357,8 +513,9 @@ bool FinitePartSolver::find_step(const FiniteSnapshot& from, const PartTarget& t
     return false;
   }
   // The hold's own forces count, too: it amplifies what the answer leaves of the laws, which would else be seen.
-  Eigen::VectorXd load = step.answer.z - now.traction;
-  const Eigen::VectorXd left = stiff.ahead + stiff.compliance * step.answer.z;
+  Eigen::VectorXd load = -now.traction;
+  load.head(c * m) += step.answer.z;
+  const Eigen::VectorXd left = stiff.ahead + stiff.compliance.leftCols(c * m) * step.answer.z;
   for (std::size_t k = 0; k < now.held.size(); ++k) {
     load[now.held[k]] -= now.stiffness[static_cast<Eigen::Index>(k)] * left[now.held[k]];
   }
@@ -372,7 +529,7 @@ bool FinitePartSolver::find_step(const FiniteSnapshot& from, const PartTarget& t
 bool FinitePartSolver::take_step(const PartTarget& target, const Step& step, double& factor, Iterate& iterate) {
   FiniteSnapshot& at = iterate.at;
   const std::vector<int> forced = forced_axes(target);
-  const int c = friction_ > 0.0 ? 3 : 1;
+  const int c = body_.friction > 0.0 ? 3 : 1;
   for (int tries = 0;; factor *= 0.5, ++tries) {
     if (tries > kMostBacktracks) return false;
     ElasticSolution next = gel_.problem.moved(at.elastic, step.change, factor);
@@ -487,7 +644,16 @@ std::optional<FiniteSnapshot> FinitePartSolver::solve(const FiniteSnapshot& from
       continue;
     }
     last_change = step.change;
-    if (error <= 1.0) return finished(std::move(iterate));
+    if (error <= 1.0) {
+      if (!soft_) return finished(std::move(iterate));
+      // An elastic object's lines aren't closed: where it gives way must be right, too.
+      Iterate looked_at = iterate;
+      evaluate(nullptr, looked_at, effort);
+      const double left = error_of(from, target, looked_at);
+      if (left <= kNearlyRight) return finished(std::move(iterate));
+      iterate = std::move(looked_at);
+      error = left;
+    }
     if (!std::isfinite(iterate.balance)) break;
   }
   why_not_ = fmt::format("Newton's method is {:.2g} times its tolerance off with {} tangents", error, made);

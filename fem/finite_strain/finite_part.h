@@ -10,11 +10,12 @@
 
 #include "core/transform.h"
 #include "fem/contact/contact_solver.h"
+#include "fem/contact/elastic_body.h"
 #include "fem/contact/press.h"
+#include "fem/contact/press_body.h"
 #include "fem/contact/press_part.h"
 #include "fem/finite_strain/finite_contact.h"
 #include "fem/finite_strain/finite_gel.h"
-#include "fem/shapes/contact_shape.h"
 
 namespace touchstone::fem {
 
@@ -27,7 +28,10 @@ struct FiniteSnapshot {
   std::vector<NodeState> state;
   Eigen::Vector3d force = Eigen::Vector3d::Zero();  ///< on the object, N
   bool touching = false;
-  DeformedGap gap;           ///< of a touching state
+  DeformedGap gap;  ///< of a touching state; from an elastic object's surface as it is then
+  /// n x 3, mm^3, gel frame: int phi_i g dA, by how much an elastic object's surface gives way, against the gel; known
+  /// where the gel touches and beside it, else zero; empty for a rigid one.
+  Eigen::MatrixX3d given;
   double penetration = 0.0;  ///< mm, the largest weighted gap below zero over its weight
   double residual = 0.0;     ///< of the contact laws
 };
@@ -40,6 +44,9 @@ Eigen::MatrixX3d traction_forces(const FiniteGel& gel, const FiniteSnapshot& at)
 /// The part of these forces that acts against bulging (nodes x 3, N).
 Eigen::MatrixX3d bulge_forces(const FiniteGel& gel, const FiniteSnapshot& at);
 
+/// What contact does to the vertex's hat, MPa: force per undeformed area.
+Eigen::Vector3d traction_at(const FiniteGel& gel, const FiniteSnapshot& at, int vertex);
+
 /// The gel's tangent at some state, factorised, with the compliance of the vertices that may touch there.
 struct FiniteTangent;
 
@@ -49,7 +56,7 @@ struct FiniteTangent;
 class FinitePartSolver {
  public:
   /// Of the tolerance, `force`, `lookup_mm` and `traction` count (see FinitePress).
-  FinitePartSolver(const FiniteGel& gel, ContactShape shape, double friction, PressTolerance tolerance);
+  FinitePartSolver(const FiniteGel& gel, PressBody body, PressTolerance tolerance);
 
   /// How deep the object reaches under the undeformed surface, mm; minus infinity if it isn't over it.
   double overlap(const RigidTransform& pose) const;
@@ -65,10 +72,15 @@ class FinitePartSolver {
   void take_back(std::shared_ptr<const FiniteTangent> tangent) { tangent_ = std::move(tangent); }
 
  private:
+  struct Soft;
   struct Iterate;
   struct Step;
   struct Now;
   void evaluate(const GapLines* held, Iterate& iterate, PartEffort& effort) const;
+  void give_way(bool anew, Iterate& iterate) const;
+  void add_given(const Iterate& iterate, const std::vector<int>& block, int components,
+                 Eigen::MatrixXd& compliance) const;
+  std::vector<int> with_those_beside(const FiniteSnapshot& at, std::vector<int> vertices) const;
   std::vector<int> candidates(const FiniteSnapshot& at) const;
   Eigen::Vector2d slid(const FiniteSnapshot& from, const FiniteSnapshot& at, int vertex,
                        const Eigen::Matrix3d& axes) const;
@@ -82,8 +94,8 @@ class FinitePartSolver {
   bool take_step(const PartTarget& target, const Step& step, double& factor, Iterate& iterate);
 
   const FiniteGel& gel_;
-  ContactShape shape_;
-  double friction_;
+  PressBody body_;
+  std::unique_ptr<const ElasticBody> soft_;  ///< none: the object is rigid
   PressTolerance tolerance_;
   int n_;
   std::shared_ptr<const FiniteTangent> tangent_;

@@ -29,12 +29,12 @@ struct Effort {
 }  // namespace
 
 struct FinitePress::Parts {
-  Parts(const FiniteGel& on, ContactShape shape, double mu, PressTolerance wanted, PronySeries relaxing)
+  Parts(const FiniteGel& on, PressBody body, PressTolerance wanted, PronySeries relaxing)
       : gel(on),
-        friction(mu),
+        friction(body.friction),
         tolerance(wanted),
         series(std::move(relaxing)),
-        solver(on, std::move(shape), mu, wanted),
+        solver(on, std::move(body), wanted),
         n(static_cast<int>(gel.rest.vertices.size())) {
     mass.compute(gel.mass);
     if (mass.info() != Eigen::Success) fail("the gel's surface mass matrix isn't positive definite");
@@ -246,7 +246,7 @@ PressState FinitePress::Parts::report(const FiniteSnapshot& at) const {
     double excess = 0.0;
     for (int v = 0; v < n; ++v) {
       if (at.state[v] == NodeState::open) continue;
-      s.traction.row(v) = at.pressure[v] * at.gap.direction.row(v) / gel.rest.weight[v] + at.shear.row(v);
+      s.traction.row(v) = traction_at(gel, at, v).transpose();
       s.largest_tension = std::max(s.largest_tension, -at.pressure[v]);
       if (std::isfinite(friction)) {
         excess = std::max(excess, at.shear.row(v).norm() - friction * std::max(0.0, at.pressure[v]));
@@ -311,13 +311,19 @@ void FinitePress::Parts::relax(double seconds, double clear, PressState& elastic
   elastic.bodies.front().wrench = elastic.wrench;
 }
 
-FinitePress::FinitePress(const FiniteGel& gel, ContactShape shape, double friction, PressTolerance tolerance,
-                         PronySeries relaxation) {
-  check_shape(shape);
+FinitePress::FinitePress(const FiniteGel& gel, PressBody body, PressTolerance tolerance, PronySeries relaxation) {
+  check_shape(body.shape);
   check(relaxation);
-  if (!(friction >= 0.0)) fail("the friction coefficient is {}, it must be at least 0", friction);
-  parts_ = std::make_unique<Parts>(gel, std::move(shape), friction, tolerance, std::move(relaxation));
+  if (!(body.friction >= 0.0)) fail("the friction coefficient is {}, it must be at least 0", body.friction);
+  if (body.elastic && !relaxation.empty()) {
+    fail("an elastic object can't be pressed at finite strain on a gel that relaxes");
+  }
+  parts_ = std::make_unique<Parts>(gel, std::move(body), tolerance, std::move(relaxation));
 }
+
+FinitePress::FinitePress(const FiniteGel& gel, ContactShape shape, double friction, PressTolerance tolerance,
+                         PronySeries relaxation)
+    : FinitePress(gel, PressBody{std::move(shape), friction, nullptr}, tolerance, std::move(relaxation)) {}
 
 FinitePress::FinitePress(FinitePress&&) noexcept = default;
 FinitePress& FinitePress::operator=(FinitePress&&) noexcept = default;
@@ -367,7 +373,12 @@ const ElasticSolution& FinitePress::solution() const {
 }
 
 double FinitePress::stored_energy() const {
-  return parts_->gel.problem.stored_energy(parts_->now.elastic);
+  const FiniteSnapshot& now = parts_->now;
+  double energy = parts_->gel.problem.stored_energy(now.elastic);
+  for (int v = 0; v < static_cast<int>(now.given.rows()); ++v) {
+    energy += 0.5 * traction_at(parts_->gel, now, v).dot(now.given.row(v));
+  }
+  return energy;
 }
 
 }  // namespace touchstone::fem

@@ -1,6 +1,6 @@
 #pragma once
-// A rigid body pressed on a neo-Hookean gel at finite strain, step by step along a motion: what fem/contact/press.h
-// does in linear elasticity, slower (a factorisation of the whole gel every part or every few) and without its limits.
+// A body pressed on a neo-Hookean gel at finite strain, step by step along a motion: what fem/contact/press.h does in
+// linear elasticity, slower (a factorisation of the whole gel every part or every few) and without its limits.
 //
 // The tangent is factorised bordered by the rows of the vertices that may touch (fem/finite_strain/finite_tangent.h).
 // The Schur complement is the surface compliance at that state, so contact with Coulomb friction is solved on it as in
@@ -9,6 +9,9 @@
 // contact forces belong to the deformed surface (fem/finite_strain/finite_contact.h). Tractions are nominal: force per
 // undeformed area. Friction acts in the plane across the vertex's mean contact direction, against the motion relative
 // to the object since the last step.
+//
+// The body may be elastic (fem/contact/elastic_body.h). It stays linear: its compliance is added to the gel's, coupled
+// where the gel's deformed surface meets it, and gaps and slips are from where its surface has gone.
 //
 // A gel may relax (fem/contact/relaxation.h): all of its nominal stress, the pressure in it, is then the hereditary
 // integral of what the elastic gel has at the same displacements (quasi-linear [Fung1972], with the same function for
@@ -23,15 +26,18 @@
 #include <optional>
 
 #include "fem/contact/press.h"
+#include "fem/contact/press_body.h"
 #include "fem/contact/relaxation.h"
 #include "fem/finite_strain/finite_gel.h"
 #include "fem/shapes/contact_shape.h"
 
 namespace touchstone::fem {
 
-/// As fem::Press for one rigid body, at finite strain. It can be moved, not copied.
+/// As fem::Press for one body, at finite strain. It can be moved, not copied.
 class FinitePress {
  public:
+  /// @throws Error as the one for a rigid body; for an elastic body where the gel relaxes
+  FinitePress(const FiniteGel& gel, PressBody body, PressTolerance tolerance = {}, PronySeries relaxation = {});
   /// `friction` as for Press. The gel must outlive this. Of the tolerance, `force`, `lookup_mm` (here: what the gaps
   /// are closed to) and `traction` (of the laws of friction; a hundred times that) count.
   /// `relaxation`: the gel's moduli relax by this series from those of the gel, which are the instantaneous ones; over
@@ -60,7 +66,7 @@ class FinitePress {
 
   /// The gel's displacement and pressure at the last step; of a gel that relaxes what the elastic one's would be.
   const ElasticSolution& solution() const;
-  /// N mm, elastic energy at the last step; likewise.
+  /// N mm, elastic energy of gel and object at the last step; likewise.
   double stored_energy() const;
 
  private:

@@ -28,7 +28,10 @@ LawRows law_rows(const FiniteGel& gel, const DeformedGap& gap, const std::vector
   const auto c = static_cast<std::size_t>(components);
   LawRows laws;
   laws.inner = space.unknowns + static_cast<int>(forced.size());
-  laws.rows.resize(c * block.size());
+  laws.rows.resize(c * block.size() + forced.size());
+  for (std::size_t b = 0; b < forced.size(); ++b) {
+    laws.rows[c * block.size() + b].emplace_back(space.unknowns + static_cast<int>(b), 1.0);
+  }
   for (std::size_t j = 0; j < block.size(); ++j) {
     const int v = block[j];
     LawRow* row = &laws.rows[c * j];

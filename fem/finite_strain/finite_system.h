@@ -14,7 +14,7 @@ namespace touchstone::fem {
 /// behind them, the object's shifts. With c rows a vertex (1 without friction, 3 with it): the gap, and the slip in
 /// two directions.
 using LawRow = std::vector<std::pair<int, double>>;
-/// The laws of all vertices that may touch, c rows a vertex.
+/// The laws of all vertices that may touch, c rows a vertex, and behind them each shift itself, times 1 mm^2.
 struct LawRows {
   std::vector<LawRow> rows;
   int inner = 0;  ///< unknowns and shifts

@@ -13,8 +13,11 @@ namespace {
 
 constexpr double kHold = 1000.0;  // over the surface's own stiffness
 /// Of the gel's own: what an object led by force has as stiffness of its own, so that the tangent isn't singular before
-/// its laws are added. Steps are longer or shorter by it, not what they come to.
-constexpr double kShiftStiffness = 1e-4;
+/// its laws are added. It is taken away again where contact holds the object, by dense algebra: with little of it in
+/// the factor the pose would be as uncertain as single precision over it, with much of it left each step would fall
+/// short.
+constexpr double kShiftStiffness = 0.1;
+constexpr double kShiftLeft = 1e-4;  // for axes along which all slips
 
 /// The gel's tree with the object's shifts above it.
 EliminationTree with_shifts(EliminationTree tree, int first, int end) {
@@ -64,6 +67,8 @@ FiniteTangent with_vertices(const FiniteTangent& tangent, const FiniteGel& gel, 
     wider.block.push_back(tangent.block[j]);
     for (int t = 0; t < c; ++t) rows_before.push_back(c * static_cast<int>(j) + t);
   }
+  const auto shifts = static_cast<int>(tangent.forced.size());
+  for (int b = 0; b < shifts; ++b) rows_before.push_back(c * static_cast<int>(tangent.block.size()) + b);
   wider.block.insert(wider.block.end(), more.begin(), more.end());
   std::sort(wider.block.begin(), wider.block.end());
   wider.block.erase(std::unique(wider.block.begin(), wider.block.end()), wider.block.end());
@@ -72,6 +77,7 @@ FiniteTangent with_vertices(const FiniteTangent& tangent, const FiniteGel& gel, 
     const bool known = std::binary_search(tangent.block.begin(), tangent.block.end(), wider.block[j]);
     for (int t = 0; t < c; ++t) (known ? rows_kept : rows_new).push_back(c * static_cast<int>(j) + t);
   }
+  for (int b = 0; b < shifts; ++b) rows_kept.push_back(c * static_cast<int>(wider.block.size()) + b);
   const LawRows laws = law_rows(gel, gap, axes, wider.block, c, tangent.forced);
   Eigen::MatrixXd loads = Eigen::MatrixXd::Zero(laws.inner, std::ssize(rows_new));
   for (std::size_t k = 0; k < rows_new.size(); ++k) {
@@ -95,6 +101,10 @@ FiniteTangent with_vertices(const FiniteTangent& tangent, const FiniteGel& gel, 
 
 double hold_stiffness(const FiniteGel& gel, int vertex) {
   return kHold * gel.problem.scales().stress / std::pow(gel.rest.weight[vertex], 1.5);
+}
+
+double shift_release(const FiniteGel& gel) {
+  return -(kShiftStiffness - kShiftLeft) * force_scale(gel) / gel.problem.scales().length;
 }
 
 ContactLaws held_stiffly(const ContactLaws& laws, const std::vector<int>& held, const Eigen::VectorXd& stiffness) {

@@ -15,7 +15,7 @@ struct FiniteTangent {
   std::vector<int> block;                       ///< vertices that may touch, rising
   std::vector<int> forced;                      ///< axes whose forces are given, rising
   int components = 1;                           ///< rows a vertex, as in LawRows
-  Eigen::MatrixXd compliance;                   ///< of the block's rows, mm^3 per MPa
+  Eigen::MatrixXd compliance;                   ///< of the rows as in LawRows, mm^3 per MPa
   std::shared_ptr<const FrontalFactor> factor;  ///< of the gel's unknowns and the shifts, without units
 };
 
@@ -42,5 +42,8 @@ ContactLaws held_stiffly(const ContactLaws& laws, const std::vector<int>& held, 
 
 /// The stiffness of a vertex's hold, MPa per mm^3.
 double hold_stiffness(const FiniteGel& gel, int vertex);
+/// What takes from a shift nearly all of the stiffness that the tangent gives it, where contact holds it instead; MPa
+/// per mm^3, below zero.
+double shift_release(const FiniteGel& gel);
 
 }  // namespace touchstone::fem

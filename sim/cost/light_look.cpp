@@ -38,28 +38,25 @@ cv::Mat spread(cv::Size size, int count) {
 class Look {
  public:
   Look(const SceneView& view, const fem::Compliance& gel, std::span<const Truth> truths,
-       const std::optional<fem::ReliefAnswer>& relief, double relief_s, double moments, int frames)
+       const std::optional<fem::ReliefAnswer>& relief, double moments, double load, int frames)
       : view_(view),
         gel_(gel),
         truths_(truths),
         moments_(moments),
+        load_(load),
         frames_(frames),
         camera_(camera_of(*view.scene.device.camera)),
         size_(render::size_of(camera_).x(), render::size_of(camera_).y()),
         response_(render::response_of(imager(view.scene.device, view.plan.bands, view.plan.sensor_noise))),
         deepest_(deepest(truths)),
-        relief_(relief),
-        relief_s_(relief_s) {
+        relief_(relief) {
     const WorkClock clock;
     scene_ = view.seen(deepest_.press, relief);
     seen_s_ = clock.seconds();
     const Truth& first = truths.front();
     const WorkClock again;
     first_ = view.seen(first.press, view.relief(first.press));
-    const auto touching = std::count_if(truths.begin(), truths.end(),
-                                        [](const Truth& truth) { return truth.press.contact_vertices > 0; });
-    touching_ = static_cast<double>(touching) / static_cast<double>(truths.size());
-    seen_s_ = touching_ * seen_s_ + (1.0 - touching_) * again.seconds();
+    seen_s_ = load_ * seen_s_ + (1.0 - load_) * again.seconds();
   }
 
   LightLook look() {
@@ -130,7 +127,7 @@ class Look {
       }
       if (!light.choice().direct) return false;
       const double drawn_s =
-          mean_over_frames([&](const render::Scene& scene) { light.render(quick ? scene : without_bounces(scene)); });
+          mean_over_moments([&](const render::Scene& scene) { light.render(quick ? scene : without_bounces(scene)); });
       found.moment_s = seen_s_ + drawn_s;
       found.how = light.choice().reason;
       holds_ = true;
@@ -145,16 +142,16 @@ class Look {
     return scene;
   }
 
-  /// Seconds that `work` takes with a frame's scene: frames without contact are as the first one.
+  /// Seconds that `work` takes with a moment's scene: between the first one's and the deepest one's.
   template <typename Work>
-  double mean_over_frames(const Work& work) const {
+  double mean_over_moments(const Work& work) const {
     const auto timed = [&](const render::Scene& scene) {
       const WorkClock clock;
       work(scene);
       return clock.seconds();
     };
-    const double touching_s = touching_ > 0.0 ? timed(scene_) : 0.0;
-    return touching_ * touching_s + (1.0 - touching_) * (touching_ < 1.0 ? timed(first_) : 0.0);
+    const double deepest_s = load_ > 0.0 ? timed(scene_) : 0.0;
+    return load_ * deepest_s + (1.0 - load_) * (load_ < 1.0 ? timed(first_) : 0.0);
   }
 
   void shared(LightLook& found) const {
@@ -164,7 +161,7 @@ class Look {
     const WorkClock clock;
     const render::SharedPaths paths(examples, std::get<render::PinholeCamera>(camera_), settings);
     found.set_up_s += 2.0 * seen_s_ + clock.seconds();
-    found.moment_s = seen_s_ + mean_over_frames([&](const render::Scene& scene) {
+    found.moment_s = seen_s_ + mean_over_moments([&](const render::Scene& scene) {
                        paths.render(scene, render::Tracer(scene), settings, view_.scene.outputs.error);
                      });
   }
@@ -194,7 +191,7 @@ class Look {
     const ChangeFinder finder(response_, *settings.noise, view_.scene.light.change_tolerance,
                               {least_blur_radius_px(camera_), blur_radius_px(camera_, nearest)}, size_);
     const int changed = cv::countNonZero(finder.changed(before, now));
-    found.moment_s = made_s + looking.seconds() + touching_ * a_pixel * changed;
+    found.moment_s = made_s + looking.seconds() + load_ * a_pixel * changed;
     const auto keys = static_cast<double>((frames_ - 1) / static_cast<int>(kFramesPerKey));
     found.set_up_s += keys * (made_s + pixel_s(tracer, key_frame_settings(view_.scene, response_, false)) * changed);
   }
@@ -203,15 +200,14 @@ class Look {
   const fem::Compliance& gel_;
   std::span<const Truth> truths_;
   double moments_;
+  double load_;
   int frames_;
   render::Camera camera_;
   cv::Size size_;
   render::ImagerResponse response_;
   const Truth& deepest_;
   const std::optional<fem::ReliefAnswer>& relief_;
-  double relief_s_;
   render::Scene first_, scene_;  // at the first frame and at the deepest
-  double touching_ = 0.0;        // part of the frames in contact
   double seen_s_ = 0.0;          // of making it
   bool holds_ = false;           // direct light does
 };
@@ -219,9 +215,9 @@ class Look {
 }  // namespace
 
 LightLook look_at_light(const SceneView& view, const fem::Compliance& gel, std::span<const Truth> truths,
-                        const std::optional<fem::ReliefAnswer>& relief, double relief_s, double moments, int frames) {
+                        const std::optional<fem::ReliefAnswer>& relief, double moments, double load, int frames) {
   TS_ASSERT(view.scene.outputs.light() && !truths.empty());
-  return Look(view, gel, truths, relief, relief_s, moments, frames).look();
+  return Look(view, gel, truths, relief, moments, load, frames).look();
 }
 
 }  // namespace touchstone::sim

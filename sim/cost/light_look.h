@@ -19,11 +19,12 @@ struct LightLook {
   double metering_s = 0.0;  ///< a frame, of a camera that sets itself
 };
 
-/// Looks at the first and the deepest of `truths`; `relief` is the fine contact of the deepest, which took `relief_s`.
-/// `moments`: at how many of them a frame's light is computed; `frames`: of the whole motion. Whether direct light
+/// Looks at the first and the deepest of `truths`; `relief` is the fine contact of the deepest. `moments`: at how many
+/// of them a frame's light is computed; `load`: part of the deepest's contact that there is at one of them, as a mean;
+/// `frames`: of the whole motion. Whether direct light
 /// holds is judged on a coarse light field, and where it doesn't, the last of what is tried is taken to. `gel` is the
 /// view's. Takes about a second. @pre the scene's pictures are asked for; there is a truth
 LightLook look_at_light(const SceneView& view, const fem::Compliance& gel, std::span<const Truth> truths,
-                        const std::optional<fem::ReliefAnswer>& relief, double relief_s, double moments, int frames);
+                        const std::optional<fem::ReliefAnswer>& relief, double moments, double load, int frames);
 
 }  // namespace touchstone::sim

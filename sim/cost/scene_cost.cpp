@@ -65,8 +65,8 @@ SceneCost scene_cost(const SceneSpec& scene, const Plan& plan, const SceneLook& 
   if (plan.events) cost.unknown.push_back("events");
 
   if (plan.fine_relief) {
-    add("fine relief", 2.0 * look.relief_s, look.moments * look.relief_s);
-    cost.camera_s += 2.0 * look.relief_s;
+    add("fine relief", look.deepest_relief_s, look.moments * look.relief_s);
+    cost.camera_s += look.deepest_relief_s;
     cost.picture_s += look.moments * look.relief_s;
   }
   const auto picture = [&](const std::string& name, double once_s, double frame_s) {

@@ -24,8 +24,6 @@ namespace touchstone::sim {
 namespace {
 
 constexpr int kMostPlayed = 40;         // frames
-constexpr double kQuick_s = 0.3;        // of a fine contact
-constexpr std::size_t kReliefs = 4;     // states whose fine contact is solved
 constexpr double kLongestNewton = 0.1;  // of the thickness: a part of a press at finite strain
 
 /// The gel as nothing touches it. @pre `gel` has a surface
@@ -74,6 +72,7 @@ template <typename Write>
 double seconds_of_file(const char* ending, const Write& write) {
   const std::filesystem::path file =
       std::filesystem::temp_directory_path() / fmt::format("touchstone-look-{}{}", getpid(), ending);
+  write(file);  // a process's first picture takes the library's own set-up
   const WorkClock clock;
   write(file);
   sha256_of_file(file);
@@ -100,6 +99,32 @@ void look_at_pictures(const SceneSpec& scene, const Plan& plan, SceneLook& look)
   if (!scene.outputs.radiance) return;
   look.files_s += seconds_of_file(
       ".exr", [&](const std::filesystem::path& file) { write_exr(file, light, channel_names(plan.bands)); });
+}
+
+/// Vertices in contact.
+double touching(const fem::PressState& press) {
+  return static_cast<double>(press.node_state.size()) -
+         static_cast<double>(std::count(press.node_state.begin(), press.node_state.end(), fem::NodeState::open));
+}
+
+/// At how many moments frames are exposed, and what part of the deepest's contact there is at each, as means.
+void look_at_exposures(const SceneSpec& scene, const Plan& plan, std::span<const Truth> truths, double faster,
+                       SceneLook& look) {
+  const bool exposed = plan.camera && scene.outputs.light();
+  const ExposureTimes exposure(scene, plan);
+  const double most = std::max(1.0, touching(deepest(truths).press));
+  double moments = 0.0, load = 0.0;
+  for (const Truth& truth : truths) {
+    const std::vector<double> times = exposed ? exposure.of(truth) : std::vector{0.0};
+    // What moves more slowly takes fewer.
+    const double each = (1.0 + (static_cast<double>(times.size()) - 1.0) / faster) / static_cast<double>(times.size());
+    for (const double time : times) {
+      moments += each;
+      load += each * std::min(1.0, touching(time > 0.0 ? state_after(truth, time) : truth.press) / most);
+    }
+  }
+  look.moments = moments / static_cast<double>(truths.size());
+  look.load = load / moments;
 }
 
 void look_at_geometry(const SceneView& view, const Truth& truth, const std::optional<fem::ReliefAnswer>& relief,
@@ -151,13 +176,7 @@ SceneLook look_at_scene(const SceneSpec& whole, const Plan& whole_plan, const fe
     truths = play_motion(scene, plan, *gel, {}, nullptr, elastic);
     look.state_s = clock.seconds() / std::max(1.0, static_cast<double>(truths.size() - 1) * plan.states_a_frame);
     look.newton_parts = newton_parts(scene.device, truths) / faster;
-    if (plan.camera && scene.outputs.light()) {
-      const ExposureTimes exposure(scene, plan);
-      double sum = 0.0;
-      for (const Truth& truth : truths) sum += static_cast<double>(exposure.of(truth).size());
-      // What moves more slowly takes fewer.
-      look.moments = 1.0 + (sum / static_cast<double>(truths.size()) - 1.0) / faster;
-    }
+    look_at_exposures(scene, plan, truths, faster, look);
   } else {
     plan.fine_relief = plan.elastic_object = plan.skin_blanching = false;
     scene.outputs.height = false;
@@ -172,25 +191,14 @@ SceneLook look_at_scene(const SceneSpec& whole, const Plan& whole_plan, const fe
   const std::optional<fem::ReliefAnswer> relief = view.relief(hardest.press);
   const double hardest_s = clock.seconds();
   if (plan.fine_relief) {
-    // Of some frames, as long as that is quick; of those that touch nothing it is.
-    double count = 1.0;
-    const std::size_t step = std::max<std::size_t>(1, truths.size() / kReliefs);
-    const bool quick = hardest_s < kQuick_s;
-    for (std::size_t k = step - 1; k < truths.size(); k += step) {
-      if (&truths[k] == &hardest || (!quick && truths[k].press.contact_vertices > 0)) continue;
-      view.relief(truths[k].press);
-      ++count;
-    }
-    look.relief_s = clock.seconds() / count;
-    if (!quick) {
-      const auto touching = std::count_if(truths.begin(), truths.end(),
-                                          [](const Truth& truth) { return truth.press.contact_vertices > 0; });
-      look.relief_s = hardest_s * static_cast<double>(touching) / static_cast<double>(truths.size());
-    }
+    const WorkClock again;
+    view.relief(truths.front().press);
+    look.relief_s = look.load * hardest_s + (1.0 - look.load) * again.seconds();
+    look.deepest_relief_s = hardest_s;
   }
   look_at_geometry(view, hardest, relief, look);
   if (!plan.camera || !scene.outputs.light()) return look;
-  look.light = look_at_light(view, *gel, truths, relief, hardest_s, look.moments, whole.motion.frame_count());
+  look.light = look_at_light(view, *gel, truths, relief, look.moments, look.load, whole.motion.frame_count());
   look_at_pictures(scene, plan, look);
   return look;
 }

@@ -12,6 +12,7 @@
 #include "sim/need/switched_effect.h"
 #include "sim/plan/change_units.h"
 #include "sim/plan/image_motion.h"
+#include "sim/press/elastic_object.h"
 #include "sim/press/gel_setup.h"
 #include "sim/scene/device_gel.h"
 #include "sim/view/marker_motion.h"
@@ -161,7 +162,7 @@ void add_played_needs(const SceneSpec& scene, const Plan& plan, const fem::Compl
 }
 
 void add_finite_strain_need(const SceneSpec& scene, const Plan& plan, const Truth& hardest, double edges,
-                            SceneNeeds& needs) {
+                            const std::filesystem::path& cache, SceneNeeds& needs) {
   if (!scene.more_objects.empty() || scene.device.mesh.force_error) return;
   EffectNeed need{"finite strain", {}, {}};
   try {
@@ -173,14 +174,16 @@ void add_finite_strain_need(const SceneSpec& scene, const Plan& plan, const Trut
     const fem::TetMesh mesh = fem::mesh_gel(body);
     const fem::Compliance linear_gel = fem::compute_compliance(mesh, materials, beads, fem::thickness_of(body));
     const fem::FiniteGel finite_gel(mesh, materials, beads, fem::thickness_of(body));
-    const fem::ContactShape shape = coarse_contact_shape(scene.object, coarse.device.mesh.fine_mm);
-    const double friction = plan.friction ? scene.object.friction : 0.0;
+    fem::PressBody object;
+    object.shape = coarse_contact_shape(scene.object, coarse.device.mesh.fine_mm);
+    object.friction = plan.friction ? scene.object.friction : 0.0;
+    if (plan.elastic_object) object.elastic = set_up_elastic_objects(scene, plan, cache).front();
     // Both with whole hats, so that they differ by what the strain makes of them alone.
     fem::PressTolerance tolerance;
     tolerance.outlines = false;
-    fem::Press linear(linear_gel, shape, friction, tolerance);
+    fem::Press linear(linear_gel, std::vector{object}, tolerance);
     tolerance.most_factorisations = kMostFactorisations;
-    fem::FinitePress finite(finite_gel, shape, friction, tolerance);
+    fem::FinitePress finite(finite_gel, object, tolerance);
     const std::optional<RigidTransform> touching = finite.touching(pose);
     if (!touching) fail("the object isn't over the gel");
     for (const double part : kStages) {

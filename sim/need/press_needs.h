@@ -20,8 +20,8 @@ void add_played_needs(const SceneSpec& scene, const Plan& plan, const fem::Compl
                       SceneNeeds& needs);
 
 /// Finite strain: the scene's object, led to its pose in `hardest` from where it just touches above or below it, by
-/// both theories on one mesh (see NeedSettings::finite_edges).
+/// both theories on one mesh (see NeedSettings::finite_edges). An elastic object's own compliance is in the cache.
 void add_finite_strain_need(const SceneSpec& scene, const Plan& plan, const Truth& hardest, double edges,
-                            SceneNeeds& needs);
+                            const std::filesystem::path& cache, SceneNeeds& needs);
 
 }  // namespace touchstone::sim

@@ -18,7 +18,7 @@ namespace {
 using nlohmann::json;
 
 /// Raised with each change of how needs are measured, or of their file.
-constexpr int kNeedFormat = 2;
+constexpr int kNeedFormat = 3;
 
 std::string text_of(const SceneNeeds& needs) {
   json all = json::array();
@@ -108,7 +108,8 @@ SceneNeeds measure_needs(const SceneSpec& wanted, const fem::Compliance& gel, co
              truths[static_cast<std::size_t>(b)].press.wrench.head<3>().norm();
     };
     const int strongest = *std::max_element(frames.begin(), frames.end(), weaker);
-    add_finite_strain_need(scene, plan, truths[static_cast<std::size_t>(strongest)], settings.finite_edges, needs);
+    add_finite_strain_need(scene, plan, truths[static_cast<std::size_t>(strongest)], settings.finite_edges, cache,
+                           needs);
   }
   stage(3);
   if (plan.camera) add_picture_needs(scene, plan, gel, truths, frames, settings, needs);

@@ -98,7 +98,7 @@ void plan_elastic_objects(const SceneSpec& scene, Plan& plan, PlanTable& table) 
 /// What keeps a scene from being pressed at finite strain; nothing: it can be.
 std::string unfit_for_finite_strain(const SceneSpec& scene, const Plan& plan) {
   if (!scene.more_objects.empty()) return "several objects";
-  if (plan.elastic_object) return "an elastic object";
+  if (plan.elastic_object && plan.relaxation) return "an elastic object on a gel that relaxes";
   if (scene.motion.is_turned()) return "motions led by torques";
   if (plan.inertia) return "inertia";
   if (scene.device.mesh.force_error) return "a mesh that isn't given by fine_mm";

@@ -26,7 +26,7 @@ fem::PressTolerance press_tolerance() {
   return tolerance;
 }
 
-/// The press that the plan calls for: at finite strain of one rigid body only.
+/// The press that the plan calls for: at finite strain of one body only.
 class PlannedPress {
  public:
   PlannedPress(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, std::vector<fem::PressBody> bodies,
@@ -35,7 +35,7 @@ class PlannedPress {
       TS_ASSERT(bodies.size() == 1);
       finite_gel_ = set_up_finite_gel(scene.device);
       TS_ASSERT(finite_gel_->rest.vertices == gel.vertices);
-      finite_.emplace(*finite_gel_, bodies.front().shape, bodies.front().friction, fem::PressTolerance{}, relaxation);
+      finite_.emplace(*finite_gel_, std::move(bodies.front()), fem::PressTolerance{}, relaxation);
     } else {
       linear_.emplace(gel, std::move(bodies), press_tolerance(), relaxation);
     }

@@ -121,7 +121,7 @@ SceneSpec clear_scene(const DeviceSpec& device, const VirtualSensorSettings& set
   scene.seed = settings.seed;
   scene.outputs = {.frames = true, .radiance = true};
   scene.outputs.contact = true;
-  scene.effects = effects_of(settings, object);
+  scene.effects = effects_of(device, settings, object);
   return scene;
 }
 

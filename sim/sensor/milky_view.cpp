@@ -114,7 +114,7 @@ class MilkyView final : public SensorView {
     scene.outputs.frames = false;
     scene.outputs.height = true;
     scene.membrane.pixel_um = std::max(settings_.membrane_um, 0.5e3 * kMapCell_mm);
-    scene.effects = effects_of(settings_, object);
+    scene.effects = effects_of(device_, settings_, object);
     if (scene.effects.fine_relief == Switch::automatic) scene.effects.fine_relief = Switch::on;
     return scene;
   }

@@ -76,7 +76,7 @@ SceneSpec unseen_scene(const DeviceSpec& device, const VirtualSensorSettings& se
   scene.seed = settings.seed;
   scene.outputs = {};
   scene.outputs.frames = false;
-  scene.effects = effects_of(settings, object);
+  scene.effects = effects_of(device, settings, object);
   return scene;
 }
 
@@ -240,13 +240,13 @@ struct VirtualSensor::Parts {
   mutable std::unique_ptr<const Optics> made;
 };
 
-EffectSwitches effects_of(const VirtualSensorSettings& settings, const ObjectSpec& object) {
+EffectSwitches effects_of(const DeviceSpec& device, const VirtualSensorSettings& settings, const ObjectSpec& object) {
   EffectSwitches effects = settings.effects;
   effects.friction = settings.always_friction && object.friction > 0.0 ? Switch::on : Switch::automatic;
   effects.direct_light = Switch::automatic;
   effects.motion_blur = effects.rolling_shutter = Switch::off;  // a touch is shown as it ends
   if (object.elastic) {
-    effects.elasticity = Elasticity::linear;
+    if (!device.gel.relaxation.empty()) effects.elasticity = Elasticity::linear;
     effects.fine_relief = Switch::off;
   }
   return effects;

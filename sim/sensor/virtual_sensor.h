@@ -36,8 +36,8 @@ struct VirtualSensorSettings {
   double interreflection_tolerance = 0.005;
   bool always_friction = false;  ///< also in straight presses, where the plan leaves it out: it holds the surface
                                  ///< together under an object, which else stretches
-  /// Counts more than what this sensor and its plan would choose, where an object allows it: elastic ones are pressed
-  /// in linear elasticity and have no fine contact. Direct light and friction stay as they are.
+  /// Counts more than what this sensor and its plan would choose, where an object allows it: elastic ones have no fine
+  /// contact, and are pressed in linear elasticity where the gel relaxes. Direct light and friction stay as they are.
   EffectSwitches effects;
   int edge_side = 4;  ///< rays along a side of pixels that differ from those beside them (render::DirectSettings): on a
                       ///< rough object these are all pixels
@@ -98,7 +98,7 @@ class TouchObject {
 };
 
 /// The switches of what a sensor with these settings does with an object.
-EffectSwitches effects_of(const VirtualSensorSettings& settings, const ObjectSpec& object);
+EffectSwitches effects_of(const DeviceSpec& device, const VirtualSensorSettings& settings, const ObjectSpec& object);
 
 /// The scene of what a virtual sensor does where `object` moves like this: its plan says which effects are simulated.
 /// It asks for no image where `picture` is false, of a device without a camera, and of a milky gel, whose pictures are

@@ -281,7 +281,7 @@ TEST(FinitePress, AWantedForceIsMet) {
 // A ball smaller than an edge that stands over a triangle's middle: at a fiftieth of the thickness it has met no
 // vertex.
 TEST(FinitePress, AWantedForceIsMetByABodyThatStandsBetweenVertices) {
-  FinitePress press(soft_gel(), SphereShape{0.8}, 0.3);
+  FinitePress press(soft_gel(), SphereShape{1.2}, 0.3);
   PressTarget target = target_at(0.55, 0.3, 0);
   target.axis[2] = AxisControl::with_force(0.05);
   EXPECT_NEAR(press.step(target).wrench[2], 0.05, 1e-5);

@@ -26,6 +26,7 @@ SceneLook look() {
   one.newton_parts = 1.5;
   one.moments = 3.0;
   one.relief_s = 0.02;
+  one.deepest_relief_s = 0.05;
   one.light = {"direct light", 5.0, 0.1, 0.0};
   one.develop_s = 0.004;
   one.files_s = 0.03;
@@ -58,7 +59,7 @@ TEST(SceneCost, AFrameIsItsStatesMomentsAndFiles) {
   EXPECT_EQ(cost.gel_s, 7.0);
   EXPECT_DOUBLE_EQ(cost.mechanics_s, 2.0 * 0.01);
   EXPECT_DOUBLE_EQ(cost.picture_s, 3.0 * 0.02 + 3.0 * 0.1 + 0.004 + 0.03);
-  EXPECT_DOUBLE_EQ(cost.camera_s, 5.0 + 2.0 * 0.02);
+  EXPECT_DOUBLE_EQ(cost.camera_s, 5.0 + 0.05);
   EXPECT_DOUBLE_EQ(frame_s(cost, "fine relief"), 3.0 * 0.02);
   EXPECT_DOUBLE_EQ(frame_s(cost, "direct light"), 0.1);
   EXPECT_DOUBLE_EQ(frame_s(cost, "motion blur"), 2.0 * 0.1);
