@@ -149,6 +149,10 @@ macro(touchstone_need_assimp)
   touchstone_plain_library(Assimp::Assimp libassimp-dev assimp/Importer.hpp assimp)
 endmacro()
 
+macro(touchstone_need_tiff)
+  touchstone_plain_library(Tiff::Tiff libtiff-dev tiffio.h tiff)
+endmacro()
+
 macro(touchstone_need_turbojpeg)
   touchstone_plain_library(TurboJpeg::TurboJpeg libturbojpeg0-dev turbojpeg.h turbojpeg)
 endmacro()

@@ -2,6 +2,8 @@
 # (image_file.cpp).
 touchstone_need_openimageio()
 touchstone_need_opencv(core imgproc)
+touchstone_need_tiff()
+touchstone_need_turbojpeg()
 touchstone_need_zlib()
 
 add_library(touchstone_image_module MODULE "${CMAKE_CURRENT_LIST_DIR}/image_module.cpp" "${CMAKE_CURRENT_LIST_DIR}/image_damage.cpp")
@@ -9,7 +11,7 @@ target_include_directories(touchstone_image_module PRIVATE "${PROJECT_SOURCE_DIR
 # Their headers don't pass our warnings.
 get_target_property(_oiio_headers OpenImageIO::OpenImageIO INTERFACE_INCLUDE_DIRECTORIES)
 target_include_directories(touchstone_image_module SYSTEM PRIVATE ${_oiio_headers})
-target_link_libraries(touchstone_image_module PRIVATE OpenImageIO::OpenImageIO ZLIB::ZLIB touchstone_options)
+target_link_libraries(touchstone_image_module PRIVATE OpenImageIO::OpenImageIO Tiff::Tiff TurboJpeg::TurboJpeg ZLIB::ZLIB touchstone_options)
 target_compile_features(touchstone_image_module PRIVATE cxx_std_20)
 set_target_properties(touchstone_image_module PROPERTIES PREFIX "" CXX_VISIBILITY_PRESET hidden)
 

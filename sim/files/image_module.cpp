@@ -17,7 +17,6 @@ namespace {
 
 constexpr int kLongestSide = 1 << 16;
 constexpr int kMostChannels = 64;
-constexpr long long kMostPixels = 100'000'000;  // a file of 1 MB may stand for a thousand times as many
 
 int failed(const std::string& why, char* message, std::size_t size) {
   std::snprintf(message, size, "%s", why.c_str());
@@ -92,9 +91,9 @@ int read(const char* path, const char* key, void* (*accept)(void*, const Touchst
                       std::to_string(spec.nchannels) + " channels, which is out of bounds",
                   message, size);
   }
-  if (static_cast<long long>(spec.width) * spec.height > kMostPixels) {
+  if (static_cast<long long>(spec.width) * spec.height > touchstone::kMostPixels) {
     return failed("has " + std::to_string(spec.width) + "x" + std::to_string(spec.height) + " pixels; at most " +
-                      std::to_string(kMostPixels) + " are read",
+                      std::to_string(touchstone::kMostPixels) + " are read",
                   message, size);
   }
   TouchstoneDepth depth = kTouchstoneFloat;

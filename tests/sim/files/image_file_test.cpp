@@ -3,8 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
+#include <zlib.h>
 
+#include <array>
 #include <chrono>
+#include <cstdint>
+#include <cstring>
 #include <fstream>
 #include <limits>
 #include <opencv2/core.hpp>
@@ -12,6 +16,7 @@
 
 #include "core/error.h"
 #include "core/whole_file.h"
+#include "render/imager/jpeg.h"
 
 // OpenImageIO loses an error message's 31 bytes with each damaged PNG, when libpng jumps over its destructors.
 extern "C" const char* __lsan_default_suppressions() {
@@ -34,6 +39,75 @@ cv::Mat pattern(int type, int width = 37, int height = 23) {
 
 bool same(const cv::Mat& a, const cv::Mat& b) {
   return a.type() == b.type() && a.size() == b.size() && cv::norm(a, b, cv::NORM_INF) == 0.0;
+}
+
+/// Something smooth with noise, as a camera's picture.
+cv::Mat frame_like(int width = 160, int height = 120) {
+  cv::Mat image(height, width, CV_8UC3);
+  cv::RNG random(7);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      image.at<cv::Vec3b>(y, x) = {cv::saturate_cast<uchar>(90 + 0.2 * x + random.gaussian(2)),
+                                   cv::saturate_cast<uchar>(100 + 0.5 * y + random.gaussian(2)),
+                                   cv::saturate_cast<uchar>(120 - 0.3 * y + random.gaussian(2))};
+    }
+  }
+  return image;
+}
+
+template <typename T>
+void put(std::string& bytes, T number) {
+  bytes.append(reinterpret_cast<const char*>(&number), sizeof number);
+}
+
+/// The pixels with rows from the bottom.
+std::string bmp_of(const cv::Mat& image) {
+  const auto row = static_cast<std::uint32_t>(image.cols) * 3;  // of a width that 4 divides
+  const std::uint32_t size = row * static_cast<std::uint32_t>(image.rows);
+  std::string bytes = "BM";
+  for (const std::uint32_t field : {54 + size, 0U, 54U, 40U}) put(bytes, field);
+  put(bytes, image.cols);
+  put(bytes, image.rows);
+  put(bytes, std::uint16_t{1});
+  put(bytes, std::uint16_t{24});
+  for (const std::uint32_t field : {0U, size, 2835U, 2835U, 0U, 0U}) put(bytes, field);
+  for (int y = image.rows - 1; y >= 0; --y) bytes.append(image.ptr<char>(y), row);
+  return bytes;
+}
+
+/// One strip, of grey pixels as they are or packed by zlib.
+std::string tiff_of(const cv::Mat& grey, bool zipped) {
+  std::string strip(grey.ptr<char>(), grey.total());
+  if (zipped) {
+    uLongf size = compressBound(grey.total());
+    std::string packed(size, '\0');
+    compress(reinterpret_cast<Bytef*>(packed.data()), &size, grey.data, grey.total());
+    strip = packed.substr(0, size);
+  }
+  constexpr std::uint16_t kShort = 3, kLong = 4;
+  const auto rows = static_cast<std::uint32_t>(grey.rows), columns = static_cast<std::uint32_t>(grey.cols);
+  constexpr std::uint32_t kStripAt = 8;
+  std::string bytes("II*\0", 4);
+  put(bytes, kStripAt + static_cast<std::uint32_t>(strip.size() + strip.size() % 2));
+  bytes += strip + std::string(strip.size() % 2, '\0');
+  const std::vector<std::array<std::uint32_t, 3>> fields = {{256, kLong, columns},
+                                                            {257, kLong, rows},
+                                                            {258, kShort, 8},
+                                                            {259, kShort, zipped ? 8U : 1U},
+                                                            {262, kShort, 1},
+                                                            {273, kLong, kStripAt},
+                                                            {277, kShort, 1},
+                                                            {278, kLong, rows},
+                                                            {279, kLong, static_cast<std::uint32_t>(strip.size())}};
+  put(bytes, static_cast<std::uint16_t>(fields.size()));
+  for (const auto& [tag, type, value] : fields) {
+    put(bytes, static_cast<std::uint16_t>(tag));
+    put(bytes, static_cast<std::uint16_t>(type));
+    put(bytes, std::uint32_t{1});
+    put(bytes, value);
+  }
+  put(bytes, std::uint32_t{0});
+  return bytes;
 }
 
 class ImageFile : public testing::Test {
@@ -185,6 +259,86 @@ TEST_F(ImageFile, DamagedFilesAreRefusedByName) {
   write_exr(folder_ / "a.exr", cv::Mat(2, 2, CV_32FC1, cv::Scalar(1)), {"Y"});
   EXPECT_THAT(complaint(folder_ / "a.exr"), HasSubstr("floats"));
   EXPECT_THROW(read_exr(folder_ / "a.png"), Error);
+}
+
+TEST_F(ImageFile, CutPicturesOfEveryKindAreRefusedByName) {
+  const cv::Mat frame = frame_like();
+  cv::Mat grey;
+  cv::extractChannel(frame, grey, 1);
+  write_png(folder_ / "whole.png", frame);
+  const std::vector<std::pair<std::string, std::string>> kinds = {{"a.png", read_whole_file(folder_ / "whole.png")},
+                                                                  {"a.jpg", render::jpeg_bytes(frame, {})},
+                                                                  {"grey.jpg", render::jpeg_bytes(grey, {})},
+                                                                  {"a.bmp", bmp_of(frame)},
+                                                                  {"plain.tif", tiff_of(grey, false)},
+                                                                  {"zipped.tif", tiff_of(grey, true)}};
+  for (const auto& [name, bytes] : kinds) {
+    write_whole_file(folder_ / name, bytes);
+    ASSERT_EQ(complaint(folder_ / name), "");
+    const cv::Mat whole = read_image(folder_ / name);
+    EXPECT_EQ(whole.size(), frame.size()) << name;
+    // A TIFF's list of strips stands behind them: of a file that is cut there, only its last entry may be missing.
+    for (const double share : {0.01, 0.2, 0.5, 0.65, 0.9, 0.99}) {
+      const auto length = static_cast<std::size_t>(share * static_cast<double>(bytes.size()));
+      write_whole_file(folder_ / name, bytes.substr(0, length));
+      EXPECT_NE(complaint(folder_ / name), "") << name << ", " << length << " bytes of " << bytes.size();
+    }
+  }
+}
+
+TEST_F(ImageFile, AJpegDamagedInsideIsRefused) {
+  const std::string whole = render::jpeg_bytes(frame_like(320, 240), {});
+  const std::size_t pixels = whole.find("\xff\xda") + 14;
+  const auto fault = [&](std::string damaged) {
+    write_whole_file(folder_ / "a.jpg", damaged);
+    return complaint(folder_ / "a.jpg");
+  };
+  ASSERT_EQ(fault(whole), "");
+  // Filled up behind its pixels, or followed by something, as some cameras make them.
+  EXPECT_EQ(fault(whole.substr(0, whole.size() - 2) + std::string(3, '\0') + "\xff\xff\xd9"), "");
+  EXPECT_EQ(fault(whole + std::string(100, 'x')), "");
+  for (const double share : {0.1, 0.3, 0.5, 0.7, 0.9}) {
+    std::string damaged = whole;
+    const std::size_t at = pixels + static_cast<std::size_t>(share * static_cast<double>(whole.size() - pixels - 1000));
+    EXPECT_NE(fault(damaged.replace(at, 900, std::string(900, '\0'))), "") << share;
+    damaged = whole;
+    EXPECT_NE(fault(damaged.erase(at, 900)), "") << share;
+    damaged = whole;
+    EXPECT_NE(fault(damaged.insert(at, whole.substr(pixels, 900))), "") << share;
+  }
+  // A few bytes too many at the end, which libjpeg itself passes over.
+  std::string longer = whole;
+  longer.insert(whole.size() - 2, "\x55");
+  EXPECT_THAT(fault(longer), HasSubstr("more of them than its size takes"));
+}
+
+TEST_F(ImageFile, ATiffWhoseCutPartIsLedToIsRefused) {
+  cv::Mat grey;
+  cv::extractChannel(frame_like(), grey, 1);
+  for (const bool zipped : {false, true}) {
+    std::string bytes = tiff_of(grey, zipped);
+    // The list of fields first, as most programs write it: then a cut file still has it.
+    const std::size_t list = bytes.size() - (2 + 9 * 12 + 4);
+    const std::string fields = bytes.substr(list);
+    std::string front = bytes.substr(0, 4);
+    put(front, std::uint32_t{8});
+    front += fields;
+    const auto strip_at = static_cast<std::uint32_t>(front.size());
+    std::memcpy(front.data() + 8 + 2 + 5 * 12 + 8, &strip_at, sizeof strip_at);
+    const std::string whole = front + bytes.substr(8, list - 8);
+    write_whole_file(folder_ / "a.tif", whole);
+    EXPECT_TRUE(same(read_image(folder_ / "a.tif"), grey));
+    for (const double share : {0.1, 0.65, 0.99}) {
+      write_whole_file(folder_ / "a.tif",
+                       whole.substr(0, static_cast<std::size_t>(share * static_cast<double>(whole.size()))));
+      EXPECT_NE(complaint(folder_ / "a.tif"), "") << zipped << " " << share;
+    }
+    if (!zipped) continue;
+    std::string damaged = whole;
+    damaged[whole.size() / 2] = static_cast<char>(damaged[whole.size() / 2] ^ 1);
+    write_whole_file(folder_ / "a.tif", damaged);
+    EXPECT_NE(complaint(folder_ / "a.tif"), "");
+  }
 }
 
 TEST_F(ImageFile, NoDamagedBitOfAPngMakesALibraryPrint) {
