@@ -13,6 +13,7 @@
 #include "core/field_error.h"
 #include "core/nearest_name.h"
 #include "core/short_text.h"
+#include "core/text_file.h"
 #include "core/whole_file.h"
 #include "core/yaml_description.h"
 
@@ -279,7 +280,10 @@ std::optional<std::string> YamlReader::text_with(const std::string& begin, const
 std::string YamlReader::scalar(const char* kind) const {
   if (describing()) return node_->place->text();
   if (!node_->yaml.IsScalar()) node_->refuse("{} is needed here", kind);
-  return node_->yaml.Scalar();
+  const std::string& text = node_->yaml.Scalar();
+  // Comments may have any bytes; what is read is written into manifests and told to Python.
+  if (!is_utf8(text)) node_->refuse("'{}' isn't UTF-8; save the file as UTF-8", short_text(text));
+  return text;
 }
 
 double YamlReader::number(Allowed allowed) const {
@@ -407,7 +411,10 @@ std::string YamlReader::required_name(const std::string& key, const std::vector<
 std::size_t YamlReader::name_index(const std::vector<std::string>& known) const {
   if (describing()) return node_->place->name(known);
   const std::string name = scalar("a name");
-  const auto found = std::find(known.begin(), known.end(), name);
+  auto found = std::find(known.begin(), known.end(), name);
+  // Programs of YAML 1.1 take "on" and "off" for truth values and write them so.
+  if (found == known.end() && name == "true") found = std::find(known.begin(), known.end(), "on");
+  if (found == known.end() && name == "false") found = std::find(known.begin(), known.end(), "off");
   if (found == known.end()) {
     node_->refuse("'{}' is not known{}; allowed is one of: {}", short_text(name), did_you_mean(name, known),
                   fmt::join(known, ", "));

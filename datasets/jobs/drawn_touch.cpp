@@ -7,9 +7,9 @@
 #include "core/edited_yaml.h"
 #include "core/random.h"
 #include "core/random_pairs.h"
+#include "core/text_file.h"
 #include "core/transform.h"
 #include "core/units.h"
-#include "core/whole_file.h"
 #include "sim/sensor/milky_view.h"
 
 namespace touchstone::datasets {
@@ -112,10 +112,10 @@ PreparedDraw prepare_draw(const std::filesystem::path& file) {
   PreparedDraw prepared;
   prepared.file = file;
   prepared.job = read_draw_job(file);
-  prepared.text = read_whole_file(file);
+  prepared.text = read_text_file(file);
   const DrawJob& job = prepared.job;
-  prepared.device_text = read_whole_file(job.draw.device);
-  for (const DrawnObjectSpec& object : job.draw.objects) prepared.object_texts.push_back(read_whole_file(object.file));
+  prepared.device_text = read_text_file(job.draw.device);
+  for (const DrawnObjectSpec& object : job.draw.objects) prepared.object_texts.push_back(read_text_file(object.file));
   prepared.effects.elasticity = job.effects.elasticity;
   prepared.effects.fine_relief = job.effects.fine_relief;
   prepared.effects.interreflection = job.effects.interreflection;

@@ -1,6 +1,6 @@
 #include "datasets/jobs/prepared_job.h"
 
-#include "core/whole_file.h"
+#include "core/text_file.h"
 
 namespace touchstone::datasets {
 
@@ -8,7 +8,7 @@ PreparedJob prepare_job(const std::filesystem::path& file) {
   PreparedJob prepared;
   prepared.file = file;
   prepared.job = read_job(file);
-  prepared.text = read_whole_file(file);
+  prepared.text = read_text_file(file);
   for (const JobScene& entry : prepared.job.scenes) {
     PreparedScene scene;
     scene.entry = entry;

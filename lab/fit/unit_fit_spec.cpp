@@ -9,7 +9,7 @@
 #include "core/error.h"
 #include "core/named_file.h"
 #include "core/short_text.h"
-#include "core/whole_file.h"
+#include "core/text_file.h"
 #include "datasets/jobs/input_files.h"
 #include "datasets/jobs/job.h"
 #include "sim/relief/relief.h"
@@ -278,7 +278,7 @@ sim::DeviceSpec device_at(const PreparedFit& fit, const Eigen::VectorXd& x) {
 PreparedFit prepare_fit(const UnitFitSpec& spec) {
   PreparedFit fit;
   fit.spec = spec;
-  fit.device_text = read_whole_file(spec.device);
+  fit.device_text = read_text_file(spec.device);
   fit.device = parse_yaml<sim::DeviceSpec>(fit.device_text, spec.device.string());
   require_fit(fit.device);
   if (fit.device.camera->width % spec.coarse_px != 0 || fit.device.camera->height % spec.coarse_px != 0) {

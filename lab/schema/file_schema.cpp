@@ -63,6 +63,15 @@ Json number_schema(const char* type, const Allowed& allowed) {
   return schema;
 }
 
+/// Where "on" and "off" are allowed, true and false are read as them.
+Json with_truth_values(const std::vector<std::string>& names) {
+  Json values = names;
+  for (const auto& [name, value] : {std::pair("on", true), std::pair("off", false)}) {
+    if (std::ranges::find(names, name) != names.end()) values.push_back(value);
+  }
+  return values;
+}
+
 Json forms_schema(const std::vector<Form>& forms);
 
 Json form_schema(const Form& form) {
@@ -74,7 +83,7 @@ Json form_schema(const Form& form) {
     case Form::Kind::boolean:
       return {{"type", "boolean"}};
     case Form::Kind::name:
-      return {{"enum", form.names}};
+      return {{"enum", with_truth_values(form.names)}};
     case Form::Kind::text:
       // `name: 5` is text to the reader.
       if (form.begin.empty() && form.end.empty()) return {{"type", {"string", "number", "boolean"}}};

@@ -7,7 +7,7 @@
 
 #include "core/edited_yaml.h"
 #include "core/random.h"
-#include "core/whole_file.h"
+#include "core/text_file.h"
 #include "render/sampling/sample_sequence.h"
 
 namespace touchstone::lab {
@@ -135,7 +135,7 @@ std::vector<std::vector<double>> design_points(const DesignPlan& plan) {
 }
 
 DesignBase read_design_base(const std::filesystem::path& file) {
-  DesignBase base{file, read_whole_file(file), {}};
+  DesignBase base{file, read_text_file(file), {}};
   base.device = parse_yaml<sim::DeviceSpec>(base.text, file.string());
   return base;
 }

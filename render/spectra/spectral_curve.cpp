@@ -8,7 +8,7 @@
 #include <string_view>
 
 #include "core/error.h"
-#include "core/whole_file.h"
+#include "core/text_file.h"
 
 namespace touchstone::render {
 namespace {
@@ -102,7 +102,7 @@ double SpectralCurve::mean(double from_nm, double to_nm) const {
 }
 
 SpectralCurve read_spectral_curve(const std::filesystem::path& file, CurveKind kind) {
-  std::istringstream lines(read_whole_file(file));
+  std::istringstream lines(read_text_file(file));
   SpectralCurve curve;
   int number = 0;
   bool header = false;

@@ -14,6 +14,18 @@ namespace {
 
 using testing::HasSubstr;
 
+enum class Effect { automatic, on, off };
+EnumNames<Effect> enum_names(Effect) {
+  return {{"auto", Effect::automatic}, {"on", Effect::on}, {"off", Effect::off}};
+}
+
+struct Effects {
+  Effect friction = Effect::automatic;
+};
+void fields(YamlReader& in, Effects& effects) {
+  in.optional("friction", effects.friction);
+}
+
 enum class Shape { sphere, box };
 EnumNames<Shape> enum_names(Shape) {
   return {{"sphere", Shape::sphere}, {"box", Shape::box}};
@@ -202,6 +214,24 @@ TEST(YamlReader, FilesAreReadAndNamed) {
   }
   std::filesystem::remove(path);
   EXPECT_THROW(read_yaml<Device>(path), Error);
+}
+
+TEST(YamlReader, OnAndOffMayHaveBecomeTruthValues) {
+  EXPECT_EQ(parse_yaml<Effects>("friction: off", "a").friction, Effect::off);
+  EXPECT_EQ(parse_yaml<Effects>("friction: false", "a").friction, Effect::off);
+  EXPECT_EQ(parse_yaml<Effects>("{\"friction\": true}", "a").friction, Effect::on);
+  EXPECT_THAT(test::message_of([] { parse_yaml<Effects>("friction: no", "a"); }), HasSubstr("'no' is not known"));
+  EXPECT_THAT(test::message_of([] { parse_yaml<Device>("poisson_ratio: 0.1\nshape: false", "a"); }),
+              HasSubstr("'false' is not known"));
+}
+
+TEST(YamlReader, ValuesAndKeysMustBeUtf8AndCommentsNeedNot) {
+  EXPECT_EQ(parse_yaml<Layer>("# 5 \xb5m\nthickness_mm: 1 # \xff\nname: k\xc3\xb6rper", "a").name, "k\xc3\xb6rper");
+  EXPECT_THAT(test::message_of([] { parse_yaml<Layer>("thickness_mm: 1\nname: k\xf6rper", "a.yaml"); }),
+              testing::AllOf(HasSubstr("a.yaml:2: name: '"), HasSubstr("isn't UTF-8; save the file as UTF-8")));
+  EXPECT_THAT(test::message_of([] { parse_yaml<Layer>("thickness_mm: 1\nn\xe4me: x", "a.yaml"); }),
+              HasSubstr("a.yaml:2:"));
+  EXPECT_EQ(parse_yaml<Layer>("\xef\xbb\xbfthickness_mm: 1\r\nname: x\r\n", "a").name, "x");
 }
 
 }  // namespace
