@@ -454,7 +454,8 @@ void Hdf5Reader::expect_whole_numbers(const std::string& path) const {
   const Handle dataset(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
   if (dataset < 0) fail("{}: has no dataset '{}'", name_, path);
   const Handle type(H5Dget_type(dataset), H5Tclose);
-  if (H5Tget_class(type) != H5T_INTEGER) fail("{}: '{}' doesn't hold whole numbers", name_, path);
+  const H5T_class_t kind = H5Tget_class(type);
+  if (kind != H5T_INTEGER && kind != H5T_ENUM) fail("{}: '{}' doesn't hold whole numbers", name_, path);
   const Handle creation(H5Dget_create_plist(dataset), H5Pclose);
   const int filters = H5Pget_nfilters(creation);
   for (int i = 0; i < filters; ++i) {

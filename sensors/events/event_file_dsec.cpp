@@ -86,8 +86,8 @@ void DsecEventReader::read(std::vector<Event>& events) {
       fail("{}: event {} is at column {}, row {}; allowed are columns 0 to {} and rows 0 to {}", name_, number, x_[i],
            y_[i], size.width - 1, size.height - 1);
     }
-    if ((polarity_[i] & ~1) != 0) {
-      fail("{}: event {} has polarity {}; allowed is 1 for ON, 0 for OFF", name_, number, polarity_[i]);
+    if (polarity_[i] < -1 || polarity_[i] > 1) {
+      fail("{}: event {} has polarity {}; allowed is 1 for ON, 0 or -1 for OFF", name_, number, polarity_[i]);
     }
     std::int64_t t_us = 0;
     if (__builtin_add_overflow(t_us_[i], offset_us_, &t_us)) {

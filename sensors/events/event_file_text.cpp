@@ -7,12 +7,16 @@
 #include <string_view>
 
 #include "core/error.h"
+#include "core/text_file.h"
 
 namespace touchstone::sensors {
 namespace {
 
 constexpr int kVersion = 2;
 constexpr int kLargestSide = 65536;
+// Of a camera that nothing is said of, where no line names the columns either. The largest event cameras have some 3000
+// pixels a side; more is the time of a file of x, y, t, p.
+constexpr int kLargestUnnamedSide = 8192;
 constexpr std::size_t kFlushBytes = 1 << 20;
 constexpr double kExactUs = 9007199254740992.0;  // 2^53: a double tells every whole number up to here
 
@@ -71,6 +75,7 @@ TextEventReader::TextEventReader(const std::filesystem::path& file, const EventR
     : name_(file.string()), file_(map_file(file)), options_(options), check_(name_, {kLargestSide, kLargestSide}) {
   source_.format = EventFormat::text;
   if (options.size) source_.size = options.size;
+  at_ = byte_order_mark({file_.bytes.get(), file_.size});
 }
 
 void TextEventReader::refuse(const std::string& what) const {
@@ -100,6 +105,7 @@ bool TextEventReader::take_names(const char* from, const char* end) {
   }
   if (seen != std::array<int, 4>{1, 1, 1, 1}) return false;
   columns_ = columns;
+  named_ = true;
   unit_ = unit;
   return true;
 }
@@ -214,14 +220,21 @@ bool TextEventReader::read_line(Event& event) {
             refuse(
                 fmt::format("'{}' isn't a column or row; allowed is 0 to {}", field_at(from, end), kLargestSide - 1));
           }
+          if (!named_ && !source_.size && value >= kLargestUnnamedSide) {
+            refuse(
+                fmt::format("'{}' would be a column or row of a camera: without a line of names fields are t x y p. "
+                            "Write the names of this file's before its events, as in '# x y t_us p'",
+                            value));
+          }
           (columns_[i] == Column::x ? event.x : event.y) = static_cast<std::uint16_t>(value);
           break;
         case Column::polarity: {
           const std::string_view field = field_at(at, end);
-          if (field != "0" && field != "1" && field != "-1") {
-            refuse(fmt::format("'{}' isn't a polarity; allowed is 1 for ON, 0 or -1 for OFF", field));
+          const bool on = field == "1" || field == "+1" || field == "True" || field == "true";
+          if (!on && field != "0" && field != "-1" && field != "False" && field != "false") {
+            refuse(fmt::format("'{}' isn't a polarity; allowed is 1 or true for ON, 0, -1 or false for OFF", field));
           }
-          event.on = field == "1";
+          event.on = on;
           at += field.size();
         }
       }

@@ -51,6 +51,7 @@ class TextEventReader {
   int line_ = 0;
   bool started_ = false;
   std::array<Column, 4> columns_{Column::time, Column::x, Column::y, Column::polarity};
+  bool named_ = false;  ///< a line of names has said which column is which
   TimeUnit unit_ = TimeUnit::unknown;
   std::optional<int> width_, height_;
 };

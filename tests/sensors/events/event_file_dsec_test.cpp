@@ -50,6 +50,41 @@ class DsecEvents : public ::testing::Test {
   std::filesystem::path file_;
 };
 
+/// Writes '/events/p' anew, of any type of HDF5.
+void write_polarities(const std::filesystem::path& file, hid_t type, const std::vector<std::int8_t>& values) {
+  const hid_t in = H5Fopen(file.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+  ASSERT_GE(in, 0);
+  H5Ldelete(in, "/events/p", H5P_DEFAULT);
+  const hsize_t count = values.size();
+  const hid_t space = H5Screate_simple(1, &count, nullptr);
+  const hid_t set = H5Dcreate2(in, "/events/p", type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  EXPECT_GE(H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), 0);
+  H5Dclose(set);
+  H5Sclose(space);
+  H5Fclose(in);
+}
+
+TEST_F(DsecEvents, PolaritiesMayBeSignedOrTruthValues) {
+  const auto polarities = [&] {
+    std::vector<bool> on;
+    for (const Event& event : read_events(file_).events) on.push_back(event.on);
+    return on;
+  };
+  write<std::uint32_t>({7, 9, 9}, {0, 0, 0}, {0, 0, 0}, {1, 0, 1}, {});
+  write_polarities(file_, H5T_NATIVE_INT8, {1, -1, 1});
+  EXPECT_THAT(polarities(), ElementsAre(true, false, true));
+  const hid_t truth = H5Tenum_create(H5T_NATIVE_INT8);  // as h5py writes bool
+  std::int8_t value = 0;
+  H5Tenum_insert(truth, "FALSE", &value);
+  value = 1;
+  H5Tenum_insert(truth, "TRUE", &value);
+  write_polarities(file_, truth, {1, 0, 1});
+  H5Tclose(truth);
+  EXPECT_THAT(polarities(), ElementsAre(true, false, true));
+  write_polarities(file_, H5T_NATIVE_INT8, {1, -2, 1});
+  EXPECT_THAT(refusal(), HasSubstr("event 1 has polarity -2; allowed is 1 for ON, 0 or -1 for OFF"));
+}
+
 TEST_F(DsecEvents, TheOffsetIsAddedToTheTimes) {
   write<std::uint32_t>({7, 9}, {639, 1}, {479, 2}, {1, 0}, 4'000'000'000'000);
   const EventRecording back = read_events(file_);
@@ -70,8 +105,8 @@ TEST_F(DsecEvents, WhatDoesntFitIsRefusedAndNotClipped) {
   EXPECT_THAT(refusal(), HasSubstr("row -1"));
   write<std::int64_t>({1, 2}, {0, 0}, {0, std::int64_t{1} << 40}, {0, 0}, 0);
   EXPECT_THAT(refusal(), HasSubstr("event 1"));
-  write<std::int64_t>({1, 2}, {0, 0}, {0, 0}, {0, -1}, 0);
-  EXPECT_THAT(refusal(), AllOf(HasSubstr("polarity -1"), HasSubstr("1 for ON")));
+  write<std::int64_t>({1, 2}, {0, 0}, {0, 0}, {0, 2}, 0);
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("polarity 2"), HasSubstr("1 for ON")));
   write<std::int64_t>({3, 2}, {0, 0}, {0, 0}, {0, 0}, 0);
   EXPECT_THAT(refusal(), AllOf(HasSubstr("event 1"), HasSubstr("2 us"), HasSubstr("3 us")));
   write<std::int64_t>({std::numeric_limits<std::int64_t>::max()}, {0}, {0}, {0}, 1);

@@ -34,6 +34,32 @@ TEST_F(TextEvents, SecondsWithoutAHeader) {
   EXPECT_EQ(back.source.size, std::nullopt);
 }
 
+TEST_F(TextEvents, AMarkOfUtf8IsPassedOver) {
+  EXPECT_THAT(read("\xef\xbb\xbft_us,x,y,p\r\n5,1,2,1\r\n").events, ElementsAre(Event{5, 1, 2, true}));
+  EXPECT_THAT(read("\xef\xbb\xbf"
+                   "5 1 2 1\n")
+                  .events,
+              ElementsAre(Event{5, 1, 2, true}));
+}
+
+TEST_F(TextEvents, TimesInThePlaceOfRowsAreSeenWithoutNames) {
+  const std::string events = "1 2 64930 1\n1 7 64935 0\n3 1 64942 1\n";
+  EXPECT_THAT(refusal(events), AllOf(HasSubstr("e.txt:1: '64930' would be a column or row of a camera"),
+                                     HasSubstr("without a line of names fields are t x y p")));
+  EXPECT_THAT(read("x y t_us p\n" + events).events,
+              ElementsAre(Event{64930, 1, 2, true}, Event{64935, 1, 7, false}, Event{64942, 3, 1, true}));
+  // Who says that the camera is so large is believed.
+  EXPECT_EQ(read("# width 10\n# height 65536\n" + events).events.size(), 3u);
+  EXPECT_EQ(read("t_us x y p\n" + events).events.size(), 3u);
+}
+
+TEST_F(TextEvents, PolaritiesHaveSeveralForms) {
+  EXPECT_THAT(read("1 0 0 True\n2 0 0 False\n3 0 0 +1\n4 0 0 -1\n5 0 0 true\n6 0 0 0\n").events,
+              ElementsAre(Event{1, 0, 0, true}, Event{2, 0, 0, false}, Event{3, 0, 0, true}, Event{4, 0, 0, false},
+                          Event{5, 0, 0, true}, Event{6, 0, 0, false}));
+  EXPECT_THAT(refusal("1 0 0 2\n"), HasSubstr("isn't a polarity"));
+}
+
 TEST_F(TextEvents, SecondsSince1970AreRoundedRightly) {
   EXPECT_THAT(read("1468940293.922985274 1 2 1\n").events, ElementsAre(Event{1468940293922985, 1, 2, true}));
 }
