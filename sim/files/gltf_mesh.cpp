@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <string_view>
 
 // Only the declarations: pictures are never decoded here, so no image library is asked for.
@@ -15,18 +16,21 @@
 #include "core/error.h"
 #include "core/json_depth.h"
 #include "core/nearest_name.h"
+#include "core/short_text.h"
 #include "core/whole_file.h"
 #include "sim/files/closed_solid.h"
 
 namespace touchstone::sim {
 namespace {
 
+constexpr std::size_t kGlbHeader = 20;  // with that of its first chunk
+constexpr const char* kMeshopt = "EXT_meshopt_compression";
+
 class GltfSolid {
  public:
   GltfSolid(const std::filesystem::path& path, double mm_per_unit) : name_(path.string()) {
     check_unit(path, mm_per_unit);
     load(path);
-    refuse_extensions();
     visited_.assign(model_.nodes.size(), false);
     Eigen::Affine3d scale = Eigen::Affine3d::Identity();
     scale.scale(mm_per_unit);
@@ -61,7 +65,7 @@ class GltfSolid {
 
   /// A file's JSON: of a binary one, the first chunk behind 12 bytes of header and 8 of its own.
   static std::string_view json_of(std::string_view content) {
-    constexpr std::size_t kLengthAt = 12, kJsonAt = 20;
+    constexpr std::size_t kLengthAt = 12, kJsonAt = kGlbHeader;
     if (!content.starts_with("glTF") || content.size() < kJsonAt) return content;
     std::uint32_t length = 0;
     std::memcpy(&length, content.data() + kLengthAt, sizeof length);
@@ -74,6 +78,7 @@ class GltfSolid {
     if (const int depth = deepest_json(json_of(content)); depth > kDeepestJson) {
       refuse("has lists and maps {} deep in each other; at most {} are read", depth, kDeepestJson);
     }
+    refuse_foreign(content);
     const auto size = static_cast<unsigned>(content.size());
     tinygltf::TinyGLTF loader;
     loader.SetImageLoader([](tinygltf::Image*, const int, std::string*, std::string*, int, int, const unsigned char*,
@@ -106,13 +111,49 @@ class GltfSolid {
     }
   }
 
-  void refuse_extensions() const {
-    // These change how surfaces look, not where they are.
-    for (const std::string& extension : model_.extensionsRequired) {
-      const bool harmless = extension.starts_with("KHR_materials_") || extension.starts_with("KHR_texture_") ||
-                            extension == "KHR_lights_punctual" || extension == "EXT_texture_webp";
-      if (!harmless) refuse("needs the extension {}, which isn't supported; store plain triangles", extension);
+  /// Refuses versions and extensions that the library knows nothing of: it reads on, and finds fault with something
+  /// else, or nothing in the file.
+  void refuse_foreign(std::string_view content) const {
+    if (content.starts_with("glTF") && content.size() >= kGlbHeader) {
+      std::uint32_t version = 0;
+      std::memcpy(&version, content.data() + 4, sizeof version);
+      if (version != 2) refuse("is a binary glTF file of version {}; 2 is read, store it so", version);
     }
+    const auto text = nlohmann::json::parse(json_of(content), nullptr, false);
+    if (!text.is_object()) return;  // the library says what is wrong with it
+    const auto asset = text.find("asset");
+    if (asset != text.end() && asset->is_object()) {
+      // A later 2.x is read as far as its minVersion allows.
+      const auto needed = asset->find("minVersion") != asset->end() ? "minVersion" : "version";
+      const auto version = asset->find(needed);
+      const std::string shown = version == asset->end() ? "none"
+                                : version->is_string()  ? version->get<std::string>()
+                                                        : version->dump();
+      const bool reads = needed[0] == 'm' ? shown == "2.0" : shown.starts_with("2.");
+      if (!reads) refuse("is glTF of {} {}; 2.0 is read, store it so", needed, short_text(shown));
+    }
+    const auto required = text.find("extensionsRequired");
+    if (required != text.end() && required->is_array()) {
+      for (const auto& extension : *required) {
+        if (extension.is_string()) refuse_extension(extension.get<std::string>());
+      }
+    }
+    const auto used = text.find("extensionsUsed");
+    // Its buffers have no bytes without it, whether it is called required or not.
+    if (used != text.end() && used->is_array() && std::ranges::find(*used, kMeshopt) != used->end()) {
+      refuse_extension(kMeshopt);
+    }
+  }
+
+  void refuse_extension(const std::string& extension) const {
+    // These change how surfaces look, not where they are.
+    const bool harmless = extension.starts_with("KHR_materials_") || extension.starts_with("KHR_texture_") ||
+                          extension == "KHR_lights_punctual" || extension == "EXT_texture_webp";
+    if (harmless) return;
+    if (extension == "KHR_draco_mesh_compression" || extension == kMeshopt) {
+      refuse("is compressed by {}, which isn't read; store it without compression", extension);
+    }
+    refuse("needs the extension {}, which isn't supported; store plain triangles", short_text(extension));
   }
 
   std::vector<int> roots() const {

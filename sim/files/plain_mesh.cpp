@@ -9,6 +9,7 @@
 #include <array>
 #include <assimp/Importer.hpp>
 #include <cctype>
+#include <charconv>
 #include <cstdint>
 #include <cstring>
 #include <fstream>
@@ -20,6 +21,8 @@
 
 #include "core/error.h"
 #include "core/isolated_call.h"
+#include "core/short_text.h"
+#include "core/text_file.h"
 #include "core/whole_file.h"
 #include "sim/files/closed_solid.h"
 #include "sim/files/polygon_triangles.h"
@@ -49,6 +52,37 @@ const char* name_of(PlainMeshFormat format) {
   return "";
 }
 
+/// The library reads "1,5" as 1, and says of a text that was cut off what it thinks of its last word.
+void check_stl_text(std::string_view text) {
+  constexpr std::string_view kVertex = "vertex", kBlanks = " \t\r\n";
+  const std::size_t end = text.rfind("endsolid");
+  const std::size_t last = std::max(text.rfind("endfacet"), text.rfind(kVertex));
+  const bool any = text.find("facet") != std::string_view::npos;
+  if (any && (end == std::string_view::npos || last == std::string_view::npos || end < last)) {
+    fail("is cut off: its text has no 'endsolid' behind its last facet");
+  }
+  int number = 0;
+  for (std::size_t at = text.find(kVertex); at != std::string_view::npos; at = text.find(kVertex, at)) {
+    const std::size_t before = text.find_last_not_of(" \t", at - 1);        // the text begins with "solid"
+    const bool begins_line = text[before] == '\n' || text[before] == '\r';  // elsewhere it may be in a solid's name
+    at += kVertex.size();
+    if (!begins_line || at >= text.size() || kBlanks.find(text[at]) == std::string_view::npos) continue;
+    ++number;
+    for (int axis = 0; axis < 3; ++axis) {
+      at = std::min(text.find_first_not_of(kBlanks, at), text.size());
+      const std::size_t next = std::min(text.find_first_of(kBlanks, at), text.size());
+      const std::string_view cell = text.substr(at, next - at);
+      const std::string_view digits = cell.substr(cell.starts_with('+') ? 1 : 0);
+      double value = 0.0;
+      const auto [to, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+      if (error == std::errc::invalid_argument || to != digits.data() + digits.size()) {
+        fail("vertex {} of its text has '{}' in the place of a number", number, short_text(cell));
+      }
+      at = next;
+    }
+  }
+}
+
 /// A text as the library wants it, in small letters and without blanks before it; a binary file as it is. The library
 /// takes a file for a binary one by its size modulo 2^32, and says little of one that was cut off.
 std::string checked_stl(const std::string& content) {
@@ -59,6 +93,7 @@ std::string checked_stl(const std::string& content) {
     std::transform(text.begin(), text.end(), text.begin(),
                    [](unsigned char letter) { return static_cast<char>(std::tolower(letter)); });
     if (!text.starts_with("solid")) fail("isn't an STL file: it is a text that doesn't begin with 'solid'");
+    check_stl_text(text);
     return text;
   }
   if (content.size() < kHeader) fail("isn't an STL file: {} bytes are no header of a binary one", content.size());
@@ -224,7 +259,8 @@ TriangleMesh mesh_of(std::string_view bytes, double mm_per_unit) {
 
 TriangleMesh read_plain_mesh(const std::filesystem::path& path, PlainMeshFormat format, double mm_per_unit) {
   check_unit(path, mm_per_unit);
-  const std::string content = read_whole_file(path);
+  std::string content = read_whole_file(path);
+  content.erase(0, byte_order_mark(content));
   if (content.empty()) fail("{}: is empty", path.string());
   std::string answer;
   try {

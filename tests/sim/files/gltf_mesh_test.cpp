@@ -286,6 +286,35 @@ TEST_F(GltfMesh, WhatIsNotPlainTrianglesIsRefused) {
   expect_refused(replaced(text, R"({"mesh": 0})", R"({"mesh": 0, "skin": 0})"), "skinned");
 }
 
+TEST_F(GltfMesh, OtherVersionsAreNamed) {
+  const std::string text = cube_.embedded();
+  expect_refused(replaced(text, R"("version": "2.0")", R"("version": "1.0")"), "is glTF of version 1.0; 2.0 is read");
+  expect_refused(R"({"asset": {"version": "1.0"}, "scenes": {"s": {"nodes": ["n"]}}, "nodes": {"n": {"meshes": []}}})",
+                 "is glTF of version 1.0; 2.0 is read");
+  expect_refused(replaced(text, R"("version": "2.0")", R"("version": "3.0")"), "is glTF of version 3.0");
+  expect_refused(replaced(text, R"("version": "2.0")", R"("version": "2.1", "minVersion": "2.1")"), "minVersion 2.1");
+  EXPECT_EQ(read(replaced(text, R"("version": "2.0")", R"("version": "2.1", "minVersion": "2.0")")).triangles.size(),
+            read(text).triangles.size());
+  std::string binary = cube_.glb();
+  binary[4] = 1;
+  expect_refused(binary, "is a binary glTF file of version 1; 2 is read");
+}
+
+TEST_F(GltfMesh, CompressionIsNamedWhateverElseIsMissing) {
+  // Draco leaves accessors without views, meshopt a buffer without bytes: the library stumbles over these first.
+  const std::string text = cube_.embedded();
+  expect_refused(
+      replaced(replaced(text, R"("scene": 0)", R"("extensionsRequired": ["KHR_draco_mesh_compression"], "scene": 0)"),
+               R"("bufferView": 0, )", ""),
+      "is compressed by KHR_draco_mesh_compression, which isn't read");
+  for (const char* list : {"extensionsRequired", "extensionsUsed"}) {
+    expect_refused(
+        replaced(replaced(text, R"("scene": 0)", fmt::format(R"("{}": ["EXT_meshopt_compression"], "scene": 0)", list)),
+                 R"("buffers": [)", R"("buffers": [{"byteLength": 1}, )"),
+        "is compressed by EXT_meshopt_compression, which isn't read");
+  }
+}
+
 TEST_F(GltfMesh, NodesInACircleAreRefused) {
   expect_refused(cube_.embedded(R"([{"children": [1]}, {"mesh": 0, "children": [0]}])"), "twice");
   expect_refused(cube_.embedded(R"([{"mesh": 0, "children": [0]}])"), "twice");

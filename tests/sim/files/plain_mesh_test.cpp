@@ -124,12 +124,31 @@ TEST_F(PlainMesh, WhatIsNoStlIsRefused) {
   EXPECT_THAT(error_of(std::string(20, '\0'), ".stl"), HasSubstr("20 bytes are no header"));
   EXPECT_THAT(error_of(binary + "more", ".stl"), HasSubstr("688 bytes, and the 12 triangles"));
   EXPECT_THAT(error_of(replaced(text, "vertex 3.0 4.0 -5.0", "vertex 3.0 4.0"), ".stl"),
-              HasSubstr("isn't a readable STL file"));
+              HasSubstr("of its text has 'endloop' in the place of a number"));
+  EXPECT_THAT(error_of(replaced(text, "-5.0", "-5,0", true), ".stl"), HasSubstr("has '-5,0' in the place of a number"));
+  EXPECT_THAT(error_of(text.substr(0, text.size() / 2), ".stl"), HasSubstr("is cut off"));
+  expect_box(replaced(text, "solid", "solid of a vertex and a facet"), ".stl");
   // A count of 2^32 / 2 + 12 triangles takes 684 bytes modulo 2^32, by which the library judges.
   std::string many = binary;
   const std::uint32_t count = 0x80000000U + 12;
   std::memcpy(many.data() + 80, &count, sizeof count);
   EXPECT_THAT(error_of(many, ".stl"), HasSubstr("684 bytes, and the 2147483660 triangles"));
+}
+
+TEST_F(PlainMesh, AMarkOfUtf8IsPassedOver) {
+  for (const char* name : {"meshio-text.stl", "meshio-text.ply", "meshio-quads.obj"}) {
+    expect_box("\xef\xbb\xbf" + box(name), fs::path(name).extension());
+  }
+}
+
+TEST_F(PlainMesh, FilesOfOtherKindsAreNamed) {
+  EXPECT_THAT(error_of("PK\x03\x04" + std::string(200, '\0'), ".stl"), HasSubstr("it is a ZIP archive (as 3MF is)"));
+  EXPECT_THAT(error_of("\x1f\x8b\x08" + std::string(200, '\0'), ".stl"), HasSubstr("it is packed by gzip"));
+  EXPECT_THAT(error_of("<!DOCTYPE html>", ".obj"), HasSubstr("it is a page or a file of XML"));
+  EXPECT_THAT(error_of("version https://git-lfs.github.com/spec/v1\n", ".glb"), HasSubstr("a pointer of Git LFS"));
+  EXPECT_THAT(error_of(std::string("\xff\xfes\0o\0l\0", 8), ".stl"), HasSubstr("text in UTF-16; save it as UTF-8"));
+  EXPECT_THAT(error_of("glTF\x02" + std::string(20, '\0'), ".stl"),
+              HasSubstr("binary glTF; its name must end in .glb"));
 }
 
 TEST_F(PlainMesh, NumbersThatAreNoneAreRefused) {
