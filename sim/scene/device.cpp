@@ -187,6 +187,21 @@ void pipeline_fields(YamlReader& in, CameraSpec& camera) {
   in.optional("jpeg", camera.jpeg);
 }
 
+/// A matrix of another resolution has its principal point at the same multiple of both sides.
+void check_principal_point(const YamlReader& in, const CameraSpec& camera) {
+  constexpr double kLowest = 0.3, kHighest = 0.8;  // of lenses that belong to their sensor: 0.4 to 0.6
+  const auto* lens = std::get_if<LensSpec>(&camera.optics);
+  if (lens == nullptr || !lens->camera_matrix) return;
+  const Eigen::Vector2d point = lens->camera_matrix->tail<2>();
+  const Eigen::Array2d share = (point.array() + 0.5) / Eigen::Array2d(camera.width, camera.height);
+  const bool outside = (share < 0.0).any() || (share > 1.0).any();
+  if (!outside && !(share < kLowest).all() && !(share > kHighest).all()) return;
+  fail_at(in.where("camera_matrix"),
+          "camera.camera_matrix: the principal point ({:g}, {:g}) is {} the picture of {} x {} pixels; a matrix of "
+          "another resolution is to be scaled, all four numbers of it",
+          point.x(), point.y(), outside ? "outside" : "in a corner of", camera.width, camera.height);
+}
+
 /// What the pipeline's blocks say together with the rest.
 void check_pipeline(const YamlReader& in, const CameraSpec& camera) {
   if (camera.auto_white_balance && camera.bayer == render::BayerPattern::none) {
@@ -470,6 +485,7 @@ void fields(YamlReader& in, CameraSpec& camera) {
             camera.row_time_us, camera.height, frame_us, camera.frame_rate_Hz);
   }
   check_pipeline(in, camera);
+  check_principal_point(in, camera);
   const double distance_mm = (camera.look_at_mm - camera.position_mm).norm();
   if (distance_mm < 1e-6) {
     fail_at(in.where("look_at_mm"), "camera.look_at_mm: is the camera's own position; the camera has no direction");

@@ -81,6 +81,18 @@ TEST(DeviceCamera, ACalibrationsMatrixAndDistortionServeAsTheyAre) {
   EXPECT_EQ(rational.distortion.k6, 0.02);
 }
 
+TEST(DeviceCamera, AMatrixOfAnotherResolutionIsRefused) {
+  const auto fault = [](const std::string& matrix) {
+    return error_of(with("focal_length_mm: 4", "camera_matrix: " + matrix));
+  };
+  EXPECT_EQ(fault("[800, 800, 319.5, 239.5]"), "");
+  EXPECT_EQ(fault("[800, 800, 420, 180]"), "") << "off the middle, as of a lens that is shifted";
+  EXPECT_THAT(fault("[1600, 1600, 641, 478]"), HasSubstr("the principal point (641, 478) is outside the picture of"));
+  EXPECT_THAT(fault("[1600, 1600, 620, 470]"), HasSubstr("is in a corner of the picture"));
+  EXPECT_THAT(fault("[400, 400, 160, 120]"), HasSubstr("is in a corner of the picture"));
+  EXPECT_THAT(fault("[800, 800, -3, 240]"), HasSubstr("outside"));
+}
+
 TEST(DeviceCamera, WhatDoesntFitIsRefused) {
   EXPECT_EQ(error_of(kLens), "");
   EXPECT_THAT(error_of(with("type: lens", "type: fisheye")), HasSubstr("fisheye"));
