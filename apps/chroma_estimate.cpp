@@ -32,10 +32,12 @@ void estimate(const EstimateOptions& options, const GlobalOptions& global) {
     forces = lab::FieldForces{sensors::load_marker_compliance(options.compliance), options.inversion};
   }
   ProgressBar bar(global.quiet);
-  const lab::FieldSummary summary = lab::write_chroma_fields(
-      model, grid, options.rest, datasets::picture_files(options.frames), forces, options.out, bar.listener());
+  const std::vector<std::filesystem::path> frames = datasets::picture_files(options.frames);
+  const lab::FieldSummary summary =
+      lab::write_chroma_fields(model, grid, options.rest, frames, forces, options.out, bar.listener());
+  warn_of_faults(summary.faults);
   fmt::print("{}: displacements.csv{} of {} frames\n", options.out.string(), forces ? " and forces.csv" : "",
-             summary.frames);
+             std::ssize(frames) - std::ssize(summary.faults));
   fmt::print("  {} of {} markers measured, {} of them beyond what calibration saw\n", summary.measured, summary.markers,
              summary.extrapolated);
   if (summary.without_force > 0) {
@@ -51,7 +53,7 @@ void add_chroma_estimation(CLI::App& estimations, const GlobalOptions& global, A
   auto options = std::make_shared<EstimateOptions>();
   command->add_option("--model", options->model, "The model that `touchstone calibrate chroma` made")->required();
   command->add_option("--rest", options->rest, "The picture of the unloaded sensor as it is mounted now")->required();
-  command->add_option("--frames", options->frames, "A folder of frames (.png, .jpg), in the order of their names")
+  command->add_option("--frames", options->frames, "A folder of frames, taken in natural order of their names")
       ->required();
   add_grid_option(*command, options->grid);
   command->add_option("--compliance", options->compliance,

@@ -1,5 +1,9 @@
 #include "apps/command.h"
 
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+
 #include "core/error.h"
 
 namespace touchstone::apps {
@@ -8,6 +12,12 @@ void require_writable_place(const std::filesystem::path& file) {
   const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
   if (!std::filesystem::is_directory(folder)) fail("{}: there is no folder {}", file.string(), folder.string());
   if (std::filesystem::is_directory(file)) fail("{}: is a folder; a file is wanted here", file.string());
+}
+
+void warn_of_faults(const std::vector<std::string>& faults) {
+  constexpr std::size_t kMostNamed = 20;
+  for (std::size_t i = 0; i < std::min(faults.size(), kMostNamed); ++i) spdlog::warn("{}: left out", faults[i]);
+  if (faults.size() > kMostNamed) spdlog::warn("{} more frames are left out", faults.size() - kMostNamed);
 }
 
 void add_calibrate_command(CLI::App& app, const GlobalOptions& global, Action& action) {

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <string>
+#include <vector>
 
 namespace touchstone::apps {
 
@@ -37,6 +39,9 @@ void add_schema_command(CLI::App& app, Action& action);
 
 /// @throws Error if a result can't be written at `file`: its folder isn't there, or it's a folder itself
 void require_writable_place(const std::filesystem::path& file);
+
+/// Warns of frames that couldn't be used, by what is wrong with each; of many it names some.
+void warn_of_faults(const std::vector<std::string>& faults);
 
 /// That a data set was there already, as generate and merge find it.
 void print_finished(const std::filesystem::path& out, std::int64_t samples);

@@ -24,12 +24,16 @@ void estimate(const EstimateOptions& options, const GlobalOptions& global) {
   ProgressBar bar(global.quiet);
   const std::vector<lab::DarknessRecord> records = lab::write_darkness_maps(
       model, datasets::picture_files(options.frames), options.out, format, options.doubt, bar.listener());
+  const std::vector<std::string> faults = lab::faults_of(records);
+  warn_of_faults(faults);
   const auto count = [&](auto fault) { return std::count_if(records.begin(), records.end(), fault); };
-  const auto untrusted = count([](const lab::DarknessRecord& record) { return !record.trusted; });
+  const auto untrusted =
+      count([](const lab::DarknessRecord& record) { return !record.trusted && record.fault.empty(); });
   const auto deeper = count([](const lab::DarknessRecord& record) { return record.deeper_percent > 0.0; });
   const auto at_border = count([](const lab::DarknessRecord& record) { return record.contact_at_border; });
-  const auto unfollowed = count([](const lab::DarknessRecord& record) { return !record.exposure_followed; });
-  fmt::print("{}: {} height maps and heights.csv\n", options.out.string(), records.size());
+  const auto unfollowed =
+      count([](const lab::DarknessRecord& record) { return !record.exposure_followed && record.fault.empty(); });
+  fmt::print("{}: {} height maps and heights.csv\n", options.out.string(), records.size() - faults.size());
   if (untrusted > 0) fmt::print("  {} of them of frames that are overexposed or dark: not to be trusted\n", untrusted);
   if (deeper > 0) fmt::print("  {} with places that are darker than any press of the calibration\n", deeper);
   if (at_border > 0) fmt::print("  {} with a contact that runs out of the picture\n", at_border);
@@ -44,7 +48,8 @@ void add_9dtact_estimation(CLI::App& estimations, const GlobalOptions& global, A
   CLI::App* command = estimations.add_subcommand("9dtact", "Height maps from its frames");
   auto options = std::make_shared<EstimateOptions>();
   command->add_option("--model", options->model, "The model that `touchstone calibrate 9dtact` made")->required();
-  command->add_option("--frames", options->frames, "A folder of frames (.png, .jpg)")->required();
+  command->add_option("--frames", options->frames, "A folder of frames, taken in natural order of their names")
+      ->required();
   command->add_option("-o,--out", options->out, "The folder of the height maps and their summary, heights.csv")
       ->required();
   command

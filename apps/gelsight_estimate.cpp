@@ -26,10 +26,12 @@ void estimate(const EstimateOptions& options, const GlobalOptions& global) {
   ProgressBar bar(global.quiet);
   const std::vector<lab::HeightRecord> records = lab::write_height_maps(
       model, settings, datasets::picture_files(options.frames), options.out, format, bar.listener());
+  const std::vector<std::string> faults = lab::faults_of(records);
+  warn_of_faults(faults);
   const auto count = [&](auto fault) { return std::count_if(records.begin(), records.end(), fault); };
-  const auto untrusted = count([](const lab::HeightRecord& record) { return !record.trusted; });
+  const auto untrusted = count([](const lab::HeightRecord& record) { return !record.trusted && record.fault.empty(); });
   const auto at_border = count([](const lab::HeightRecord& record) { return record.contact_at_border; });
-  fmt::print("{}: {} height maps and heights.csv\n", options.out.string(), records.size());
+  fmt::print("{}: {} height maps and heights.csv\n", options.out.string(), records.size() - faults.size());
   if (untrusted > 0) {
     fmt::print("  {} of them of frames that are overexposed, dark or of one colour: not to be trusted\n", untrusted);
   }
@@ -45,7 +47,8 @@ void add_gelsight_estimation(CLI::App& estimations, const GlobalOptions& global,
   CLI::App* command = estimations.add_subcommand("gelsight", "Height maps from its frames");
   auto options = std::make_shared<EstimateOptions>();
   command->add_option("--model", options->model, "The model that `touchstone calibrate gelsight` made")->required();
-  command->add_option("--frames", options->frames, "A folder of frames (.png, .jpg)")->required();
+  command->add_option("--frames", options->frames, "A folder of frames, taken in natural order of their names")
+      ->required();
   command->add_option("-o,--out", options->out, "The folder of the height maps and their summary, heights.csv")
       ->required();
   command

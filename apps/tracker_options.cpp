@@ -27,7 +27,7 @@ std::shared_ptr<FrameOptions> add_frame_options(CLI::App& command, const std::st
   options->split = split;
   command.add_option("--data", options->data, "A data set that `touchstone generate` made");
   command.add_option("--split", options->split, "Its scenes: train, validate, test or all")->capture_default_str();
-  command.add_option("--frames", options->frames, "A folder of recorded frames (.png, in the order of their names)");
+  command.add_option("--frames", options->frames, "A folder of recorded frames, taken in natural order of their names");
   command.add_option("--forces", options->forces,
                      "Times and forces of recorded frames: CSV with the header "
                      "file,t_us,force_x_N,force_y_N,force_z_N");
@@ -52,6 +52,7 @@ std::vector<lab::TrackedSequence> tracked_frames(const FrameOptions& options, co
     tracked = lab::track(chosen_frames(options), settings, bar.listener());
   }
   for (const lab::TrackedSequence& sequence : tracked) {
+    warn_of_faults(sequence.faults);
     if (sequence.lost() > 0) {
       spdlog::warn("{}: beads weren't found {} times in {} frames", sequence.source.name, sequence.lost(),
                    sequence.beads.size());

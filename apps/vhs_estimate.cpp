@@ -4,6 +4,7 @@
 #include "apps/tracker_options.h"
 #include "core/error.h"
 #include "core/whole_file.h"
+#include "datasets/sets/csv_cells.h"
 #include "lab/vhs/bead_tractions.h"
 #include "sensors/beads/stiffness_model_file.h"
 #include "sensors/tractions/marker_compliance_file.h"
@@ -28,8 +29,8 @@ std::string csv_of(const std::vector<lab::ForceRecord>& records) {
       "sequence,frame,t_us,force_x_N,force_y_N,force_z_N,true_x_N,true_y_N,true_z_N,extrapolated,beads_missing\n";
   for (const lab::ForceRecord& record : records) {
     const Eigen::Vector3d& force = record.estimate.force;
-    csv += fmt::format("{},{},{},{:.6f},{:.6f},{:.6f},", record.sequence, record.frame, record.estimate.t_us, force.x(),
-                       force.y(), force.z());
+    csv += fmt::format("{},{},{},{:.6f},{:.6f},{:.6f},", datasets::csv_cell(record.sequence), record.frame,
+                       record.estimate.t_us, force.x(), force.y(), force.z());
     if (record.truth) {
       csv += fmt::format("{:.6f},{:.6f},{:.6f}", record.truth->x(), record.truth->y(), record.truth->z());
     } else {

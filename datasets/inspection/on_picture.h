@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "core/error.h"
 #include "sim/files/image_file.h"
@@ -18,6 +19,24 @@ void on_picture(const std::filesystem::path& file, const Act& act) {
     if (message.find(file.string()) != std::string::npos) throw;
     fail("{}: {}", file.string(), message);
   }
+}
+
+/// The same of one frame of many, which isn't to end the work on the others. Gives what is wrong with it, or "".
+template <typename Act>
+std::string fault_on_picture(const std::filesystem::path& file, const Act& act) {
+  try {
+    on_picture(file, act);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+/// @param faults of the frames that can't be used
+/// @throws Error with the first of them if they are all of the frames
+inline void require_a_frame(const std::vector<std::string>& faults, std::size_t frames) {
+  if (faults.empty() || faults.size() < frames) return;
+  fail("none of {} frames can be used; the first: {}", frames, faults.front());
 }
 
 }  // namespace touchstone::datasets

@@ -1,30 +1,58 @@
 #pragma once
-// The little of CSV that recorded frames' tables need: cells without quotes, numbers without blanks.
+// The little of CSV that recorded frames' tables need: numbers without blanks, no line's end within quotes.
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <optional>
 #include <sstream>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "core/error.h"
 #include "core/named_file.h"
-#include "core/whole_file.h"
+#include "core/text_file.h"
 
 namespace touchstone::datasets {
 
-/// The cells of a line, empty ones too.
-inline std::vector<std::string> cells_of(const std::string& line) {
+/// The cells of a line, empty ones too. One that begins with a quote goes to the next lone quote; two of them in it
+/// stand for one. @throws Error at `where` for a quote without an end, or with anything but a comma behind it
+inline std::vector<std::string> cells_of(std::string_view line, const SourceLocation& where) {
   std::vector<std::string> cells;
-  std::size_t begin = 0;
-  for (std::size_t comma = line.find(','); comma != std::string::npos; comma = line.find(',', begin)) {
-    cells.push_back(line.substr(begin, comma - begin));
-    begin = comma + 1;
+  for (;;) {
+    std::string cell;
+    if (line.starts_with('"')) {
+      line.remove_prefix(1);
+      for (;; line.remove_prefix(1)) {
+        if (line.empty()) fail_at(where, "a quote has no end");
+        if (line.starts_with("\"\"")) {
+          line.remove_prefix(1);
+        } else if (line.front() == '"') {
+          break;
+        }
+        cell += line.front();
+      }
+      line.remove_prefix(1);
+      if (!line.empty() && line.front() != ',') fail_at(where, "'{}' stands behind a quote's end", line);
+    } else {
+      cell = line.substr(0, line.find(','));
+      line.remove_prefix(cell.size());
+    }
+    cells.push_back(std::move(cell));
+    if (line.empty()) return cells;
+    line.remove_prefix(1);  // the comma
   }
-  cells.push_back(line.substr(begin));
-  return cells;
+}
+
+/// A text as a cell: in quotes where a comma, a quote or the end of a line would break it.
+inline std::string csv_cell(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char letter : text) quoted += letter == '"' ? "\"\"" : std::string(1, letter);
+  return quoted + "\"";
 }
 
 /// The number that a cell holds, if it holds nothing else.
@@ -63,20 +91,22 @@ inline std::filesystem::path file_in(const std::filesystem::path& folder, const 
 /// passed over. @throws Error naming file and line if the first line or a line's number of cells is another
 template <typename Row>
 void for_each_row(const std::filesystem::path& csv, const std::string& columns, const Row& row) {
-  std::istringstream lines(read_whole_file(csv));
-  const std::size_t count = cells_of(columns).size();
+  std::istringstream lines(read_text_file(csv));
+  const std::vector<std::string> wanted = cells_of(columns, {csv.string(), 0});
   int number = 0;
   for (std::string line; std::getline(lines, line);) {
     ++number;
     const SourceLocation where{csv.string(), number};
     if (!line.empty() && line.back() == '\r') line.pop_back();
     if (number == 1) {
-      if (line != columns) fail_at(where, "the first line is '{}'; it must be '{}'", line, columns);
+      if (cells_of(line, where) != wanted) fail_at(where, "the first line is '{}'; it must be '{}'", line, columns);
       continue;
     }
     if (line.empty()) continue;
-    const std::vector<std::string> cells = cells_of(line);
-    if (cells.size() != count) fail_at(where, "has {} cells; {} are needed: {}", cells.size(), count, columns);
+    const std::vector<std::string> cells = cells_of(line, where);
+    if (cells.size() != wanted.size()) {
+      fail_at(where, "has {} cells; {} are needed: {}", cells.size(), wanted.size(), columns);
+    }
     row(where, cells);
   }
 }

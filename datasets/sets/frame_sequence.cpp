@@ -1,10 +1,16 @@
 #include "datasets/sets/frame_sequence.h"
 
+#include <fmt/ranges.h>
+
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
+#include <iterator>
+#include <string_view>
 
 #include "core/error.h"
+#include "core/natural_order.h"
 #include "core/units.h"
 #include "core/whole_file.h"
 #include "datasets/sets/manifest.h"
@@ -14,6 +20,13 @@ namespace touchstone::datasets {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// Endings of what read_image reads, in small letters.
+constexpr auto kPictures = std::to_array<std::string_view>(
+    {".png", ".jpg", ".jpeg", ".jpe", ".bmp", ".tif", ".tiff", ".webp", ".ppm", ".pgm", ".pnm"});
+/// Of pictures that would be missing among the frames. EXR and HDR aren't: height maps lie beside frames.
+constexpr auto kOtherPictures = std::to_array<std::string_view>(
+    {".gif", ".heic", ".heif", ".avif", ".jp2", ".j2k", ".tga", ".psd", ".dng", ".jxl", ".pcx", ".jfif"});
 
 }  // namespace
 
@@ -50,16 +63,32 @@ std::vector<FrameSequence> frames_of_data_set(const fs::path& folder, std::optio
 }
 
 std::vector<fs::path> picture_files(const fs::path& folder) {
-  if (!fs::is_directory(folder)) fail("{}: isn't a folder", folder.string());
+  std::error_code failed;
+  if (!fs::is_directory(folder, failed)) fail("{}: isn't a folder", folder.string());
   std::vector<fs::path> files;
   for (const auto& entry : fs::directory_iterator(folder)) {
-    std::string ending = entry.path().extension().string();
+    const fs::path name = entry.path().filename();
+    // Hidden ones aren't pictures: beside each 1.png that a Mac copies lies a ._1.png.
+    if (name.native().starts_with('.') || entry.is_directory(failed)) continue;
+    std::string ending = name.extension().string();
     std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
-    const bool picture = ending == ".png" || ending == ".jpg" || ending == ".jpeg";
-    if (picture && entry.is_regular_file()) files.push_back(entry.path());
+    if (std::ranges::find(kOtherPictures, ending) != kOtherPictures.end()) {
+      fail("{}: is a picture of a kind that isn't read here; allowed are {}", entry.path().string(),
+           fmt::join(kPictures, ", "));
+    }
+    if (std::ranges::find(kPictures, ending) != kPictures.end()) files.push_back(entry.path());
   }
-  if (files.empty()) fail("{}: has no .png, .jpg or .jpeg file", folder.string());
-  std::sort(files.begin(), files.end());
+  if (files.empty()) fail("{}: has no picture; read are {}", folder.string(), fmt::join(kPictures, ", "));
+  // By the stem first: "a.png" stands before "a-1.png" though a hyphen comes before a dot.
+  std::ranges::sort(files, [](const fs::path& a, const fs::path& b) {
+    const std::string first = a.stem().string(), second = b.stem().string();
+    return first == second ? a < b : natural_less(first, second);
+  });
+  const auto twice = std::ranges::adjacent_find(files, {}, [](const fs::path& file) { return file.stem(); });
+  if (twice != files.end()) {
+    fail("{}: {} has the same name; which of them is the frame can't be known", std::next(twice)->string(),
+         twice->filename().string());
+  }
   return files;
 }
 

@@ -31,10 +31,12 @@ struct FrameSequence {
 /// @throws Error if the folder isn't a finished data set, has no frames, or has no scene of this split
 std::vector<FrameSequence> frames_of_data_set(const std::filesystem::path& folder, std::optional<Split> split);
 
-/// The .png, .jpg and .jpeg files of a folder, by name. @throws Error if it's no folder, or there is none
+/// The pictures of a folder in natural order (core/natural_order.h), whatever their kinds: PNG, JPEG, BMP, TIFF, WebP,
+/// PPM. Hidden files, folders and files of other endings are passed over; what can't be read is among them.
+/// @throws Error if it's no folder, or there is none; naming a picture of a kind that isn't read, or two of one stem
 std::vector<std::filesystem::path> picture_files(const std::filesystem::path& folder);
 
-/// Recorded frames: the picture_files of a folder, at a constant rate. @throws Error if there is none
+/// Recorded frames: the picture_files of a folder, at a constant rate. @throws Error as they do
 FrameSequence frames_of_folder(const std::filesystem::path& folder, double frame_rate_Hz);
 
 /// Recorded frames with forces, as a CSV file with the columns `file,t_us,force_x_N,force_y_N,force_z_N` in this order

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <utility>
 
 #include "core/error.h"
 #include "core/whole_file.h"
 #include "datasets/inspection/on_picture.h"
+#include "datasets/sets/csv_cells.h"
 #include "sensors/tractions/friction_state.h"
 #include "sensors/tractions/seen_markers.h"
 
@@ -141,8 +143,8 @@ FieldSummary write_chroma_fields(const sensors::HueModel& model, const Eigen::Ve
   std::string wrenches = ForceTable::header();
   FieldSummary summary;
   for (const fs::path& frame : frames) {
-    const std::string name = frame.filename().string();
-    datasets::on_picture(frame, [&](const cv::Mat& image) {
+    const std::string name = datasets::csv_cell(frame.filename().string());
+    std::string fault = datasets::fault_on_picture(frame, [&](const cv::Mat& image) {
       const sensors::ColourMarkerReading& reading = finder.find(image);
       const sensors::HueField field = estimator.estimate(reading);
       sensors::MarkerField elastic;
@@ -153,9 +155,14 @@ FieldSummary write_chroma_fields(const sensors::HueModel& model, const Eigen::Ve
       summary.measured += static_cast<int>(std::count(field.field.measured.begin(), field.field.measured.end(), 1));
       summary.extrapolated += static_cast<int>(std::count(field.extrapolated.begin(), field.extrapolated.end(), 1));
     });
+    if (!fault.empty()) {
+      displacements += fmt::format("{},,,,,0,0,{}{}\n", name, datasets::csv_cell(fault), table ? ",,," : "");
+      summary.faults.push_back(std::move(fault));
+    }
     ++summary.frames;
     if (progress) progress("fields", summary.frames, std::ssize(frames));
   }
+  datasets::require_a_frame(summary.faults, frames.size());
   write_whole_file(folder / "displacements.csv", displacements);
   if (table) write_whole_file(folder / "forces.csv", wrenches);
   return summary;

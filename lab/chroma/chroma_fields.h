@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "core/progress.h"
@@ -22,18 +23,21 @@ struct FieldForces {
 /// What came of all frames.
 struct FieldSummary {
   int frames = 0;
-  int markers = 0;        ///< of all frames together
-  int measured = 0;       ///< of these
-  int extrapolated = 0;   ///< of the measured
-  int without_force = 0;  ///< frames with too few markers, measured and not extrapolated; 0 without forces
+  int markers = 0;                  ///< of all frames together
+  int measured = 0;                 ///< of these
+  int extrapolated = 0;             ///< of the measured
+  int without_force = 0;            ///< frames with too few markers, measured and not extrapolated; 0 without forces
+  std::vector<std::string> faults;  ///< of frames that can't be read or are unfit: they have no markers
 };
 
 /// Estimates each frame, in their order, and writes FOLDER/displacements.csv and, if `forces` are given,
 /// FOLDER/forces.csv when all are done (docs/file-formats.md, "Recorded frames"). The folder is made if it isn't
 /// there.
 /// @param rest the picture of the unloaded sensor
-/// @throws Error naming the picture that can't be read or is unfit (see ColourMarkerFinder); for a model that doesn't
-///   fit the grid, or a compliance of another grid or another spacing than the model's
+/// A frame that can't be read or is unfit (see ColourMarkerFinder) has one line, whose `flaw` says what is wrong.
+/// @throws Error naming the picture at rest if it is so, or if all frames are; for a model that doesn't fit the grid,
+/// or
+///   a compliance of another grid or another spacing than the model's
 FieldSummary write_chroma_fields(const sensors::HueModel& model, const Eigen::Vector2i& grid,
                                  const std::filesystem::path& rest, const std::vector<std::filesystem::path>& frames,
                                  const std::optional<FieldForces>& forces, const std::filesystem::path& folder,

@@ -4,7 +4,7 @@
 #include <opencv2/core.hpp>
 
 #include "core/whole_file.h"
-#include "datasets/inspection/on_picture.h"
+#include "datasets/sets/csv_cells.h"
 #include "sim/files/image_file.h"
 
 namespace touchstone::lab {
@@ -15,9 +15,14 @@ namespace fs = std::filesystem;
 std::string csv_of(const std::vector<DarknessRecord>& records) {
   std::string csv =
       "file,highest_mm,volume_mm3,contact_mm2,exposure,exposure_followed,deeper_percent,bulged_percent,"
-      "saturated_percent,trusted,contact_at_border\n";
+      "saturated_percent,trusted,contact_at_border,fault\n";
   for (const DarknessRecord& record : records) {
-    csv += fmt::format("{},{:.5f},{:.5f},{:.4f},{:.5f},{},{:.3f},{:.3f},{:.3f},{},{}\n", record.file, record.highest_mm,
+    const std::string file = datasets::csv_cell(record.file);
+    if (!record.fault.empty()) {
+      csv += fmt::format("{},,,,,,,,,0,,{}\n", file, datasets::csv_cell(record.fault));
+      continue;
+    }
+    csv += fmt::format("{},{:.5f},{:.5f},{:.4f},{:.5f},{},{:.3f},{:.3f},{:.3f},{},{},\n", file, record.highest_mm,
                        record.volume_mm3, record.contact_mm2, record.exposure, record.exposure_followed ? 1 : 0,
                        record.deeper_percent, record.bulged_percent, record.saturated_percent, record.trusted ? 1 : 0,
                        record.contact_at_border ? 1 : 0);
@@ -25,9 +30,8 @@ std::string csv_of(const std::vector<DarknessRecord>& records) {
   return csv;
 }
 
-DarknessRecord record_of(const sensors::DarknessResult& result, const fs::path& frame, double pixel_mm2) {
+DarknessRecord record_of(const sensors::DarknessResult& result, double pixel_mm2) {
   DarknessRecord record;
-  record.file = frame.filename().string();
   cv::minMaxLoc(result.height_mm, nullptr, &record.highest_mm);
   record.volume_mm3 = pixel_mm2 * cv::sum(result.height_mm)[0];
   record.contact_mm2 = pixel_mm2 * result.contact_pixels;
@@ -46,20 +50,29 @@ DarknessRecord record_of(const sensors::DarknessResult& result, const fs::path& 
 std::vector<DarknessRecord> write_darkness_maps(const sensors::DarknessModel& model,
                                                 const std::vector<fs::path>& frames, const fs::path& folder,
                                                 HeightFormat format, bool doubt, const Progress& progress) {
-  require_stems_apart(frames);
   sensors::DarknessEstimator estimator(model);
   fs::create_directories(folder);
   const double pixel_mm2 = model.mm_per_px * model.mm_per_px;
   std::vector<DarknessRecord> records;
   for (const fs::path& frame : frames) {
-    datasets::on_picture(frame, [&](const cv::Mat& image) {
-      const sensors::DarknessResult& result = estimator.estimate(image);
-      write_height_map(result.height_mm, folder / frame.filename(), format);
-      if (doubt) sim::write_png(folder / (frame.stem().string() + "-doubt.png"), result.doubt);
-      records.push_back(record_of(result, frame, pixel_mm2));
+    DarknessRecord record;
+    const sensors::DarknessResult* result = nullptr;
+    const std::string fault = datasets::fault_on_picture(frame, [&](const cv::Mat& image) {
+      result = &estimator.estimate(image);
+      record = record_of(*result, pixel_mm2);
     });
+    record.file = frame.filename().string();
+    if (fault.empty()) {
+      write_height_map(result->height_mm, folder / frame.filename(), format);
+      if (doubt) sim::write_png(folder / (frame.stem().string() + "-doubt.png"), result->doubt);
+    } else {
+      record.trusted = false;
+      record.fault = fault;
+    }
+    records.push_back(record);
     if (progress) progress("heights", std::ssize(records), std::ssize(frames));
   }
+  faults_of(records);
   write_whole_file(folder / "heights.csv", csv_of(records));
   return records;
 }

@@ -24,11 +24,14 @@ struct DarknessRecord {
   double saturated_percent = 0.0;
   bool trusted = true;
   bool contact_at_border = false;
+  std::string fault = {};  ///< as HeightRecord's
 };
 
 /// Estimates each frame and writes FOLDER/STEM.exr or .png; with `doubt` also FOLDER/STEM-doubt.png (bits of
 /// sensors::Doubt); and FOLDER/heights.csv when all are done. The folder is made if it isn't there.
-/// @throws Error naming the frame that can't be read or estimated, or if two have one stem
+/// A frame that can't be read or estimated has a record with its fault, and no map.
+/// @pre no two frames have one stem (datasets::picture_files)
+/// @throws Error if there is a fault in each of them
 std::vector<DarknessRecord> write_darkness_maps(const sensors::DarknessModel& model,
                                                 const std::vector<std::filesystem::path>& frames,
                                                 const std::filesystem::path& folder, HeightFormat format, bool doubt,

@@ -2,11 +2,9 @@
 
 #include <iterator>
 #include <opencv2/core.hpp>
-#include <set>
 
-#include "core/error.h"
 #include "core/whole_file.h"
-#include "datasets/inspection/on_picture.h"
+#include "datasets/sets/csv_cells.h"
 #include "sim/files/image_file.h"
 
 namespace touchstone::lab {
@@ -18,9 +16,14 @@ constexpr double kLevelsPerMm = 10000.0;
 constexpr double kZeroLevel = 10000.0;
 
 std::string csv_of(const std::vector<HeightRecord>& records) {
-  std::string csv = "file,highest_mm,volume_mm3,contact_mm2,saturated_percent,trusted,contact_at_border\n";
+  std::string csv = "file,highest_mm,volume_mm3,contact_mm2,saturated_percent,trusted,contact_at_border,fault\n";
   for (const HeightRecord& record : records) {
-    csv += fmt::format("{},{:.5f},{:.5f},{:.4f},{:.3f},{},{}\n", record.file, record.highest_mm, record.volume_mm3,
+    const std::string file = datasets::csv_cell(record.file);
+    if (!record.fault.empty()) {
+      csv += fmt::format("{},,,,,0,,{}\n", file, datasets::csv_cell(record.fault));
+      continue;
+    }
+    csv += fmt::format("{},{:.5f},{:.5f},{:.4f},{:.3f},{},{},\n", file, record.highest_mm, record.volume_mm3,
                        record.contact_mm2, record.saturated_percent, record.trusted ? 1 : 0,
                        record.contact_at_border ? 1 : 0);
   }
@@ -41,40 +44,36 @@ void write_height_map(const cv::Mat& height_mm, fs::path file, HeightFormat form
       {{"mm_per_level", fmt::format("{}", 1.0 / kLevelsPerMm)}, {"zero_level", fmt::format("{}", kZeroLevel)}});
 }
 
-void require_stems_apart(const std::vector<fs::path>& frames) {
-  std::set<std::string> stems;
-  for (const fs::path& frame : frames) {
-    if (!stems.insert(frame.stem().string()).second) {
-      fail("{}: another frame is called '{}', too; their height maps would be one file", frame.string(),
-           frame.stem().string());
-    }
-  }
-}
-
 std::vector<HeightRecord> write_height_maps(const sensors::HeightModel& model, const sensors::HeightSettings& settings,
                                             const std::vector<fs::path>& frames, const fs::path& folder,
                                             HeightFormat format, const Progress& progress) {
-  require_stems_apart(frames);
   sensors::HeightEstimator estimator(model, settings);
   fs::create_directories(folder);
   const double pixel_mm2 = model.mm_per_px * model.mm_per_px;
   std::vector<HeightRecord> records;
   for (const fs::path& frame : frames) {
-    datasets::on_picture(frame, [&](const cv::Mat& image) {
+    HeightRecord record;
+    record.file = frame.filename().string();
+    cv::Mat height_mm;
+    record.fault = datasets::fault_on_picture(frame, [&](const cv::Mat& image) {
       const sensors::HeightResult& result = estimator.estimate(image);
-      HeightRecord record;
-      record.file = frame.filename().string();
       cv::minMaxLoc(result.height_mm, nullptr, &record.highest_mm);
       record.volume_mm3 = pixel_mm2 * cv::sum(result.height_mm)[0];
       record.contact_mm2 = pixel_mm2 * result.contact_pixels;
       record.saturated_percent = 100.0 * result.saturated_share;
       record.trusted = result.trusted();
       record.contact_at_border = result.contact_at_border;
-      write_height_map(result.height_mm, folder / frame.filename(), format);
-      records.push_back(record);
+      height_mm = result.height_mm;
     });
+    if (record.fault.empty()) {
+      write_height_map(height_mm, folder / frame.filename(), format);
+    } else {
+      record.trusted = false;
+    }
+    records.push_back(record);
     if (progress) progress("heights", std::ssize(records), std::ssize(frames));
   }
+  faults_of(records);
   write_whole_file(folder / "heights.csv", csv_of(records));
   return records;
 }

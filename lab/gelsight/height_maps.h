@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/progress.h"
+#include "datasets/inspection/on_picture.h"
 #include "sensors/heights/height_estimator.h"
 
 namespace touchstone::lab {
@@ -19,9 +20,6 @@ enum class HeightFormat {
 /// Writes a height map (CV_32FC1, mm) beside `file`: the same name with .exr or .png.
 void write_height_map(const cv::Mat& height_mm, std::filesystem::path file, HeightFormat format);
 
-/// @throws Error if two frames have one stem: their maps would be one file
-void require_stems_apart(const std::vector<std::filesystem::path>& frames);
-
 /// A line of the summary.
 struct HeightRecord {
   std::string file;
@@ -31,10 +29,24 @@ struct HeightRecord {
   double saturated_percent = 0.0;
   bool trusted = true;
   bool contact_at_border = false;
+  std::string fault = {};  ///< why there is no map of it: it can't be read or isn't of the model's kind; "": there is
 };
 
+/// The faults of records. @throws Error if no frame could be used
+template <typename Record>
+std::vector<std::string> faults_of(const std::vector<Record>& records) {
+  std::vector<std::string> faults;
+  for (const Record& record : records) {
+    if (!record.fault.empty()) faults.push_back(record.fault);
+  }
+  datasets::require_a_frame(faults, records.size());
+  return faults;
+}
+
 /// Estimates each frame and writes FOLDER/STEM.exr or .png, and FOLDER/heights.csv when all are done. The folder
-/// is made if it isn't there. @throws Error naming the frame that can't be read or estimated, or if two have one stem
+/// is made if it isn't there. A frame that can't be read or estimated has a record with its fault, and no map.
+/// @pre no two frames have one stem (datasets::picture_files)
+/// @throws Error if there is a fault in each of them
 std::vector<HeightRecord> write_height_maps(const sensors::HeightModel& model, const sensors::HeightSettings& settings,
                                             const std::vector<std::filesystem::path>& frames,
                                             const std::filesystem::path& folder, HeightFormat format,

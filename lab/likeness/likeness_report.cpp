@@ -7,6 +7,7 @@
 #include "core/error.h"
 #include "core/whole_file.h"
 #include "datasets/inspection/contact_sheet.h"
+#include "datasets/sets/csv_cells.h"
 #include "lab/likeness/likeness.h"
 #include "sim/files/image_file.h"
 
@@ -46,10 +47,10 @@ cv::Mat on_grey(const cv::Mat& difference, double factor) {
 
 std::string csv_row(const PressLikeness& press, const char* way, const PictureLikeness& of) {
   return fmt::format(
-      "{},{},{},{:.2f},{:.2f},{:.4f},{:.4f},{:.4f},{},{:.4f},{:.4f},{:.4f},{:.3f},{:.4f},{:.2f},{:.2f}\n", press.name,
-      press.learned ? "yes" : "no", way, press.radius_px, press.simulated_radius_px, press.place_mm.x(),
-      press.place_mm.y(), press.depth_mm, press.shallow ? "yes" : "no", press.gain[2], press.gain[1], press.gain[0],
-      of.psnr, of.ssim, of.off.inside, of.off.ring);
+      "{},{},{},{:.2f},{:.2f},{:.4f},{:.4f},{:.4f},{},{:.4f},{:.4f},{:.4f},{:.3f},{:.4f},{:.2f},{:.2f}\n",
+      datasets::csv_cell(press.name), press.learned ? "yes" : "no", way, press.radius_px, press.simulated_radius_px,
+      press.place_mm.x(), press.place_mm.y(), press.depth_mm, press.shallow ? "yes" : "no", press.gain[2],
+      press.gain[1], press.gain[0], of.psnr, of.ssim, of.off.inside, of.off.ring);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "core/whole_file.h"
+#include "datasets/sets/csv_cells.h"
 #include "sensors/tractions/bead_field.h"
 #include "sensors/tractions/seen_markers.h"
 
@@ -32,6 +33,7 @@ TractionSummary write_bead_tractions(const std::vector<TrackedSequence>& sequenc
   for (const TrackedSequence& sequence : sequences) {
     std::vector<Eigen::Vector2d> rest = rest_px;
     if (rest.empty()) {
+      require_first(sequence);
       const sensors::TrackedBeads& first = sequence.beads.front();
       if (first.found() != static_cast<int>(first.status.size())) {
         fail("{}: its first frame, without load, shows {} of {} beads", sequence.source.name, first.found(),
@@ -42,8 +44,8 @@ TractionSummary write_bead_tractions(const std::vector<TrackedSequence>& sequenc
     const sensors::BeadView view = sensors::view_of(rest, compliance);
     for (std::size_t k = 0; k < sequence.beads.size(); ++k) {
       const sensors::TrackedBeads& beads = sequence.beads[k];
-      const std::string frame =
-          fmt::format("{},{},{}", sequence.source.name, sequence.source.frames[k].frame, beads.t_us);
+      const std::string frame = fmt::format("{},{},{}", datasets::csv_cell(sequence.source.name),
+                                            sequence.source.frames[k].frame, beads.t_us);
       const sensors::MarkerField field = sensors::bead_field(beads, rest, view, compliance);
       const auto found = static_cast<int>(std::count(field.measured.begin(), field.measured.end(), 1));
       ++summary.frames;

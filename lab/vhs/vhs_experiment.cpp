@@ -9,7 +9,7 @@
 
 #include "core/dense_solvers.h"
 #include "core/error.h"
-#include "sim/files/image_file.h"
+#include "datasets/inspection/on_picture.h"
 
 namespace touchstone::lab {
 namespace {
@@ -45,6 +45,12 @@ std::int64_t TrackedSequence::lost() const {
   return count;
 }
 
+void require_first(const TrackedSequence& sequence) {
+  if (!sequence.without_first) return;
+  fail("{}: its first frame, which must show the beads without load, can't be used: {}", sequence.source.name,
+       sequence.faults.front());
+}
+
 std::vector<TrackedSequence> track(const std::vector<datasets::FrameSequence>& sequences,
                                    const sensors::BeadTrackerSettings& settings, const Progress& progress) {
   std::int64_t total = 0;
@@ -52,18 +58,23 @@ std::vector<TrackedSequence> track(const std::vector<datasets::FrameSequence>& s
   std::atomic<std::int64_t> done{0};
   std::vector<TrackedSequence> tracked(sequences.size());
   tbb::parallel_for(std::size_t{0}, sequences.size(), [&](std::size_t i) {
-    tracked[i].source = sequences[i];
+    TrackedSequence& to = tracked[i];
+    to.source.name = sequences[i].name;
     sensors::BeadTracker tracker(settings);
     for (const datasets::LabelledFrame& frame : sequences[i].frames) {
-      const cv::Mat image = sim::read_image(frame.file);
-      try {
-        tracked[i].beads.push_back(tracker.track({image, frame.t_us}));
-      } catch (const Error& error) {
-        fail("{}: {}", frame.file.string(), error.what());
+      std::string fault = datasets::fault_on_picture(frame.file, [&](const cv::Mat& image) {
+        to.beads.push_back(tracker.track({image, frame.t_us}));
+      });
+      if (fault.empty()) {
+        to.source.frames.push_back(frame);
+      } else {
+        to.without_first = to.without_first || &frame == &sequences[i].frames.front();
+        to.faults.push_back(std::move(fault));
       }
       const std::int64_t now = ++done;
       if (progress) progress("tracking", now, total);
     }
+    datasets::require_a_frame(to.faults, sequences[i].frames.size());
   });
   return tracked;
 }
@@ -73,6 +84,7 @@ sensors::ForceSamples training_samples(const std::vector<TrackedSequence>& seque
   samples.grid = grid;
   samples.rest.assign(static_cast<std::size_t>(grid * grid), Eigen::Vector2d::Zero());
   for (const TrackedSequence& sequence : sequences) {
+    require_first(sequence);
     const sensors::TrackedBeads& first = sequence.beads.front();
     if (first.found() != grid * grid) {
       fail("{}: the tracker finds {} of {} beads in the first frame, which must show all of them without load",
@@ -130,6 +142,7 @@ std::vector<ForceRecord> estimate_forces(const std::vector<TrackedSequence>& seq
                                          const sensors::StiffnessForceModel& model, RestChoice rest) {
   std::vector<ForceRecord> records;
   for (const TrackedSequence& sequence : sequences) {
+    if (rest == RestChoice::first_frame) require_first(sequence);
     const std::vector<Eigen::Vector2d>& reference =
         rest == RestChoice::model ? model.rest : sequence.beads.front().positions;
     for (std::size_t i = 0; i < sequence.beads.size(); ++i) {

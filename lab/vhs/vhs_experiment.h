@@ -25,12 +25,17 @@ inline constexpr double kPublishedForceError_N = 0.1;
 struct TrackedSequence {
   datasets::FrameSequence source;
   std::vector<sensors::TrackedBeads> beads;
+  std::vector<std::string> faults = {};  ///< of frames that couldn't be read or tracked: they aren't in `source`
+  bool without_first = false;            ///< the first frame, which shows the rest, is among them
 
   std::int64_t lost() const;  ///< beads that weren't measured, summed over frames
 };
 
-/// Follows the beads through each sequence, from its first frame on. Sequences run in parallel.
-/// @throws Error if a picture can't be read or tracked
+/// @throws Error if the first frame of the sequence is left out
+void require_first(const TrackedSequence& sequence);
+
+/// Follows the beads through each sequence, from its first frame on. Sequences run in parallel. A frame that can't be
+/// read or tracked is left out of its sequence. @throws Error if all frames of a sequence are
 std::vector<TrackedSequence> track(const std::vector<datasets::FrameSequence>& sequences,
                                    const sensors::BeadTrackerSettings& settings, const Progress& progress = {});
 

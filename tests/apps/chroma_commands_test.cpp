@@ -221,6 +221,22 @@ TEST_F(ChromaCommands, MarkersBeyondCalibrationTakeNoPartInForces) {
   EXPECT_EQ(forces[1][15], "no contact");
 }
 
+TEST_F(ChromaCommands, AFrameThatCantBeReadHasALineOfItsOwn) {
+  ASSERT_EQ(calibrate(kHeader + lines_).exit_code, 0);
+  sim::write_png(folder_.path() / "new/10.png", paint(all_by(Eigen::Vector3d::Zero())));
+  folder_.write("new/2.png", "damaged");
+  const ProgramRun run = estimate();
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.err, AllOf(HasSubstr("new/2.png: can't be read as an image"), HasSubstr("left out")));
+  EXPECT_THAT(run.out, HasSubstr("displacements.csv of 1 frames"));
+  const auto table = table_of(in("out/displacements.csv"));
+  ASSERT_EQ(table.size(), 27u);
+  EXPECT_EQ(table[1][0], "2.png");
+  EXPECT_EQ(table[1][1], "");
+  EXPECT_EQ(table[1][5], "0");
+  EXPECT_EQ(table[2][0], "10.png");
+}
+
 TEST_F(ChromaCommands, AMarkerMissingAtRestIsNamed) {
   ColourPicture picture = resting();
   picture.stretch.assign(picture.count(), 1.0);
@@ -260,7 +276,7 @@ TEST_F(ChromaCommands, OtherMistakesAreRefused) {
   EXPECT_FALSE(fs::exists(in("m.json")));
 
   ASSERT_EQ(calibrate(kHeader + lines_).exit_code, 0);
-  expect_refused(estimate(), "has no .png");
+  expect_refused(estimate(), "has no picture");
   fs::copy(in("grey.png"), in("new/a.png"));
   expect_refused(estimate({}, "4x5"), "rest.png: coloured markers");
   expect_refused(estimate({"--compliance", in("rest.png")}), "rest.png");

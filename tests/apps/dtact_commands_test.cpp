@@ -78,7 +78,7 @@ TEST_F(DtactCommands, FramesGiveHeightMaps) {
   EXPECT_EQ(sim::read_image(folder_.path() / "out/ball-doubt.png").type(), CV_8UC1);
   EXPECT_THAT(read_whole_file(folder_.path() / "out/heights.csv"),
               HasSubstr("file,highest_mm,volume_mm3,contact_mm2,exposure,exposure_followed,deeper_percent,"
-                        "bulged_percent,saturated_percent,trusted,contact_at_border\nball.png,"));
+                        "bulged_percent,saturated_percent,trusted,contact_at_border,fault\nball.png,"));
 }
 
 TEST_F(DtactCommands, MistakesAreRefusedByName) {

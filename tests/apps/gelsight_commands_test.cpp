@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 
 #include "core/whole_file.h"
+#include "render/imager/jpeg.h"
 #include "sim/files/image_file.h"
 #include "tests/apps/run_program.h"
 #include "tests/sensors/heights/painted_gel.h"
@@ -22,6 +23,7 @@ using test::ProgramRun;
 using test::run_program;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr const char* kHeader = "file,u_px,v_px,radius_px,ball_diameter_mm\n";
 constexpr double kScale = 0.053;
@@ -78,7 +80,8 @@ TEST_F(GelsightCommands, RecordedFramesGiveHeightMaps) {
   const cv::Mat truth = painter_.heights([&](const Eigen::Vector2d& place) { return ball_.at(place); });
   EXPECT_LT(cv::norm(map.image, truth, cv::NORM_INF), 0.03);
   const std::string csv = read_whole_file(folder_.path() / "out/heights.csv");
-  EXPECT_THAT(csv, HasSubstr("file,highest_mm,volume_mm3,contact_mm2,saturated_percent,trusted,contact_at_border\n"));
+  EXPECT_THAT(csv,
+              HasSubstr("file,highest_mm,volume_mm3,contact_mm2,saturated_percent,trusted,contact_at_border,fault\n"));
   EXPECT_THAT(csv, HasSubstr("\ndark.png,"));
 
   const ProgramRun levels = run_program(
@@ -87,6 +90,34 @@ TEST_F(GelsightCommands, RecordedFramesGiveHeightMaps) {
   cv::Mat from_levels;
   sim::read_image(folder_.path() / "png/ball.png").convertTo(from_levels, CV_32F, 1e-4, -1.0);
   EXPECT_LT(cv::norm(from_levels, map.image, cv::NORM_INF), 6e-5);
+}
+
+TEST_F(GelsightCommands, ADamagedFrameIsRefusedAloneAndNamed) {
+  ASSERT_EQ(calibrate(kHeader + lines_[0] + lines_[1] + lines_[2], {"rest.png"}).exit_code, 0);
+  const cv::Mat frame = painter_.press(ball_).frame;
+  const std::string jpeg = render::jpeg_bytes(frame, {.quality = 95});
+  folder_.write("new/10.jpg", jpeg.substr(0, jpeg.size() * 65 / 100));
+  folder_.write("new/2.jpg", jpeg);
+  folder_.write("new/._2.jpg", "a Mac's");
+  sim::write_png(folder_.path() / "new/small, grey.png", cv::Mat(9, 12, CV_8UC3, cv::Scalar(9, 9, 9)));
+  const ProgramRun run =
+      run_program({"estimate", "gelsight", "--model", in("m.gel"), "--frames", in("new"), "-o", in("out")});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("3 height maps"));
+  EXPECT_THAT(run.err, AllOf(HasSubstr("new/10.jpg: can't be read as an image (Premature end of JPEG file): left out"),
+                             HasSubstr("new/small, grey.png: ")));
+  EXPECT_FALSE(fs::exists(in("out/10.exr")));
+  const std::string csv = read_whole_file(folder_.path() / "out/heights.csv");
+  EXPECT_THAT(csv, HasSubstr("\n10.jpg,,,,,0,,"));
+  EXPECT_THAT(csv, HasSubstr("\n\"small, grey.png\",,,,,0,,"));
+  EXPECT_LT(csv.find("\n2.jpg,"), csv.find("\n10.jpg,"));
+  EXPECT_THAT(csv, Not(HasSubstr("._2")));
+
+  for (const char* name : {"ball.png", "dark.png", "2.jpg", "small, grey.png"})
+    fs::remove(folder_.path() / "new" / name);
+  test::expect_refused(
+      run_program({"estimate", "gelsight", "--model", in("m.gel"), "--frames", in("new"), "-o", in("none")}),
+      "none of 1 frames can be used; the first: ");
 }
 
 TEST_F(GelsightCommands, TablesAreRefusedWithLineAndField) {

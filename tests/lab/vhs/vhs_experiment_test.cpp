@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "sim/files/image_file.h"
+#include "tests/support/message_of.h"
 #include "tests/support/temporary_folder.h"
 
 namespace touchstone::lab {
@@ -179,6 +180,70 @@ TEST(FramesOfFolder, AreInTheOrderOfTheirNamesAtTheRate) {
   EXPECT_EQ(sequence.frames[2].t_us, 2000);
   EXPECT_THROW(datasets::frames_of_folder(folder.path(), 0), Error);
   EXPECT_THROW(datasets::frames_of_folder(folder.path() / "none", 30), Error);
+}
+
+TEST(FramesOfFolder, AreInNaturalOrderWhateverTheirKinds) {
+  const test::TemporaryFolder folder;
+  for (const char* name : {"0.png", "1.bmp", "10.tif", "11.JPG", "2.tiff", "._1.bmp", ".hidden.png", "Thumbs.db",
+                           ".DS_Store", "desktop.ini", "depth.exr"}) {
+    folder.write(name, "x");
+  }
+  std::filesystem::create_directory(folder.path() / "3.png");
+  std::filesystem::create_symlink("nowhere", folder.path() / "4.png");
+  std::vector<std::string> names;
+  for (const auto& file : datasets::picture_files(folder.path())) names.push_back(file.filename());
+  EXPECT_THAT(names, testing::ElementsAre("0.png", "1.bmp", "2.tiff", "4.png", "10.tif", "11.JPG"));
+}
+
+TEST(FramesOfFolder, WhatWouldBeMissingOrTwiceIsNamed) {
+  const auto fault = [](const std::vector<std::string>& names) {
+    const test::TemporaryFolder folder;
+    for (const std::string& name : names) folder.write(name, "x");
+    return test::message_of([&] { datasets::picture_files(folder.path()); });
+  };
+  EXPECT_THAT(fault({"1.png", "2.gif"}), HasSubstr("2.gif: is a picture of a kind that isn't read here"));
+  EXPECT_THAT(fault({"1.png", "2.png", "2.jpg"}), HasSubstr("2.png: 2.jpg has the same name"));
+  EXPECT_THAT(fault({"._1.png", "notes.txt"}), HasSubstr("has no picture"));
+  EXPECT_EQ(fault({"01.png", "1.png"}), "no error");
+}
+
+TEST(VhsExperiment, AFrameThatCantBeReadIsLeftOutAndNamed) {
+  const test::TemporaryFolder folder;
+  const auto csv = folder.write("forces.csv", write_recording(folder, 6));
+  folder.write("frame003.png", "damaged");
+  const auto tracked = track({datasets::frames_of_force_table(folder.path(), csv)}, {});
+  ASSERT_EQ(tracked[0].faults.size(), 1u);
+  EXPECT_THAT(tracked[0].faults[0], HasSubstr("frame003.png: can't be read as an image"));
+  ASSERT_EQ(tracked[0].source.frames.size(), 5u);
+  ASSERT_EQ(tracked[0].beads.size(), 5u);
+  EXPECT_EQ(tracked[0].source.frames[3].frame, 4) << "the others keep their numbers";
+  EXPECT_EQ(training_samples(tracked, 3).forces.size(), 5u);
+
+  folder.write("frame000.png", "damaged");
+  const auto without_first = track({datasets::frames_of_force_table(folder.path(), csv)}, {});
+  EXPECT_THAT(test::message_of([&] { training_samples(without_first, 3); }),
+              HasSubstr("its first frame, which must show the beads without load, can't be used: "));
+  for (int i = 0; i < 6; ++i) folder.write(fmt::format("frame{:03}.png", i), "damaged");
+  EXPECT_THAT(test::message_of([&] { track({datasets::frames_of_force_table(folder.path(), csv)}, {}); }),
+              HasSubstr("none of 6 frames can be used; the first: "));
+}
+
+TEST(ForceTable, MayHaveAMarkAndNamesInQuotes) {
+  const test::TemporaryFolder folder;
+  const std::string header = "file,t_us,force_x_N,force_y_N,force_z_N";
+  folder.write("a, \"b\".png", "x");
+  const auto read = [&](const std::string& text) {
+    return datasets::frames_of_force_table(folder.path(), folder.write("forces.csv", text)).frames;
+  };
+  const auto frames = read("\xef\xbb\xbf\"file\"," + header.substr(5) + "\r\n\"a, \"\"b\"\".png\",7,1,2,\"3\"\r\n");
+  ASSERT_EQ(frames.size(), 1u);
+  EXPECT_EQ(frames[0].file.filename(), "a, \"b\".png");
+  EXPECT_EQ(frames[0].force, Eigen::Vector3d(1, 2, 3));
+  EXPECT_THAT(message_of_table(header + "\n\"a.png,0,1,2,3\n"), HasSubstr("forces.csv:2: a quote has no end"));
+  EXPECT_THAT(message_of_table(header + "\n\"a\".png,0,1,2,3\n"), HasSubstr("stands behind a quote's end"));
+  EXPECT_THAT(message_of_table("\xff\xfe"
+                               "f"),
+              HasSubstr("UTF-16"));
 }
 
 }  // namespace
