@@ -186,12 +186,12 @@ void bind_chroma(py::module_& module) {
       module, "HueModel", "From how a coloured marker looks to how it has moved; see calibrate_hue.")
       .def_static(
           "load",
-          [](const std::string& path) {
+          [](const py::object& path) {
             return std::make_shared<HueModel>(sensors::load_hue_model(needed_path(path, "path")));
           },
           py::arg("path"), "Reads a model file.")
       .def(
-          "save", [](const HueModel& self, const std::string& path) { sensors::save(self, needed_path(path, "path")); },
+          "save", [](const HueModel& self, const py::object& path) { sensors::save(self, needed_path(path, "path")); },
           py::arg("path"), "Writes it, whole or not at all.")
       .def_readonly("spacing_mm", &HueModel::spacing_mm, "Of the grid.")
       .def_readonly("samples", &HueModel::samples, "It was calibrated on.")

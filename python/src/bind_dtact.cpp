@@ -95,13 +95,13 @@ void bind_dtact(py::module_& module) {
                                                             "What calibrate_darkness has found of one sensor.")
       .def_static(
           "load",
-          [](const std::string& path) {
+          [](const py::object& path) {
             return std::make_shared<DarknessModel>(sensors::load_darkness_model(needed_path(path, "path")));
           },
           py::arg("path"), "Reads a model file.")
       .def(
           "save",
-          [](const DarknessModel& self, const std::string& path) { sensors::save(self, needed_path(path, "path")); },
+          [](const DarknessModel& self, const py::object& path) { sensors::save(self, needed_path(path, "path")); },
           py::arg("path"), "Writes it, whole or not at all.")
       .def_readonly("mm_per_px", &DarknessModel::mm_per_px, "Of the gel.")
       .def_readonly("presses", &DarknessModel::presses, "That it was made of.")

@@ -18,11 +18,8 @@ namespace {
 
 constexpr int kMostThreads = 4096;  // as the command's --threads
 
-/// A message may name a file whose name isn't UTF-8.
 py::object text_or_none(const std::string& text) {
-  if (text.empty()) return py::none();
-  const auto size = static_cast<py::ssize_t>(text.size());
-  return py::reinterpret_steal<py::object>(PyUnicode_DecodeUTF8(text.data(), size, "backslashreplace"));
+  return text.empty() ? py::object(py::none()) : text_of(text);
 }
 
 void set_error(const Error& error, const std::string& field) {
@@ -64,33 +61,25 @@ py::dict dict_of(const datasets::GenerateReport& report) {
   result["kept"] = report.kept;
   result["damaged_blocks"] = report.damaged_blocks;
   result["drawn_again"] = report.drawn_again;
-  result["warning"] = report.warning;
+  result["warning"] = text_of(report.warning);
   return result;
 }
 
-void check_job_and_out(const std::string& job, const std::string& out) {
-  needed_path(job, "job");
-  needed_path(out, "out");
-}
-
-py::dict generate(const std::string& job, const std::string& out, int threads, bool timings, const std::string& cache,
-                  const std::string& shard, const py::object& progress) {
-  if (threads < 0 || threads > kMostThreads) {
-    fail("threads: {} is not allowed; allowed is from 0 to {} (0: as many as the machine has)", threads, kMostThreads);
-  }
-  check_job_and_out(job, out);
-  checked_path(cache, "cache");
+py::dict generate(const py::object& job_file, const py::object& out_folder, const py::object& threads, bool timings,
+                  const py::object& cache_folder, const std::string& shard, const py::object& progress) {
+  const std::string job = needed_path(job_file, "job"), out = needed_path(out_folder, "out");
+  const std::string cache = path_from(cache_folder, "cache");
   const Progress listener = progress_to(progress);
   datasets::GenerateOptions how =
       datasets::simulated(cache.empty() ? sim::default_cache_folder() : std::filesystem::path(cache));
-  how.threads = threads;
+  how.threads = whole_number_from<int>(threads, "threads", 0, kMostThreads);
   how.timings = timings;
   if (!shard.empty()) how.shard = datasets::shard_of(shard);
   return dict_of(unlocked([&] { return datasets::generate(job, out, how, listener); }));
 }
 
-py::dict merge(const std::string& job, const std::string& out, const py::object& progress) {
-  check_job_and_out(job, out);
+py::dict merge(const py::object& job_file, const py::object& out_folder, const py::object& progress) {
+  const std::string job = needed_path(job_file, "job"), out = needed_path(out_folder, "out");
   const Progress listener = progress_to(progress);
   return dict_of(unlocked([&] { return datasets::merge(job, out, listener); }));
 }
@@ -120,21 +109,22 @@ void bind_errors(py::module_&) {
 
 void bind_files(py::module_& module) {
   module.def(
-      "scenes_folder", [] { return datasets::scenes_folder().string(); },
+      "scenes_folder",
+      [] { return py::module_::import("os").attr("fsdecode")(py::bytes(datasets::scenes_folder().string())); },
       "Where the shipped devices, objects and scenes lie.");
   module.def(
       "read_image",
-      [](const std::string& path) {
-        needed_path(path, "path");
-        return array_of(unlocked([&] { return sim::read_image(path); }));
+      [](const py::object& path) {
+        const std::string file = needed_path(path, "path");
+        return array_of(unlocked([&] { return sim::read_image(file); }));
       },
       py::arg("path"), "Reads a picture as it is stored: uint8 or uint16, grey or BGR.");
   module.def(
       "write_png",
-      [](const std::string& path, const py::object& image) {
-        needed_path(path, "path");
+      [](const py::object& path, const py::object& image) {
+        const std::string file = needed_path(path, "path");
         const Picture picture = picture_from(image, "image");
-        unlocked([&] { sim::write_png(path, picture.mat); });
+        unlocked([&] { sim::write_png(file, picture.mat); });
       },
       py::arg("path"), py::arg("image"), "Writes a PNG: uint8 or uint16, grey or BGR.");
   module.def("generate", &generate, py::arg("job"), py::arg("out"), py::arg("threads") = 0, py::arg("timings") = true,

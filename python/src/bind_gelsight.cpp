@@ -95,13 +95,13 @@ void bind_gelsight(py::module_& module) {
                                                         "What calibrate_height has found of one sensor.")
       .def_static(
           "load",
-          [](const std::string& path) {
+          [](const py::object& path) {
             return std::make_shared<HeightModel>(sensors::load_height_model(needed_path(path, "path")));
           },
           py::arg("path"), "Reads a model file.")
       .def(
           "save",
-          [](const HeightModel& self, const std::string& path) { sensors::save(self, needed_path(path, "path")); },
+          [](const HeightModel& self, const py::object& path) { sensors::save(self, needed_path(path, "path")); },
           py::arg("path"), "Writes it, whole or not at all.")
       .def_readonly("mm_per_px", &HeightModel::mm_per_px, "Of the membrane.")
       .def_readonly("presses", &HeightModel::presses, "That it was made of.")

@@ -26,7 +26,7 @@ constexpr double kLongestShear_mm = 100.0;  // friction's history is stepped in 
 
 /// The file of this name, or the shipped one: "gelsight-flat" is scenes/devices/gelsight-flat.yaml.
 fs::path named_file(const std::string& name, const char* folder) {
-  const fs::path given(checked_path(name, folder));
+  const fs::path given(name);
   std::error_code ignored;
   if (given.has_parent_path() || fs::exists(given, ignored)) return given;
   const fs::path shipped = datasets::scenes_folder() / folder;
@@ -44,28 +44,35 @@ fs::path named_file(const std::string& name, const char* folder) {
        fmt::join(known, ", "));
 }
 
-/// A dict as text. What isn't of JSON's types stays a TypeError.
+/// What stands for a value that JSON doesn't know: of NumPy's numbers and arrays and of other libraries' plain ones, of
+/// a path its name. @throws py::type_error for any other
+py::object plain_value(const py::object& value) {
+  if (py::hasattr(value, "tolist")) return value.attr("tolist")();
+  if (py::hasattr(value, "__fspath__")) return py::module_::import("os").attr("fsdecode")(value);
+  if (PyIndex_Check(value.ptr()) != 0) return py::module_::import("operator").attr("index")(value);
+  if (py::hasattr(value, "__float__")) return py::float_(value);
+  throw py::type_error("a value of " + std::string(py::str(py::type::of(value))) + " isn't one that a file may have");
+}
+
+/// A dict as text. @throws Error for what isn't of JSON's types
 std::string json_of(const py::handle& value) {
   try {
     const py::object dumps = py::module_::import("json").attr("dumps");
     // YAML knows no halves of a letter (\\ud83d\\ude00), which JSON writes without this.
-    return dumps(value, py::arg("ensure_ascii") = false).attr("encode")("utf-8").cast<std::string>();
+    return dumps(value, py::arg("ensure_ascii") = false, py::arg("default") = py::cpp_function(&plain_value))
+        .attr("encode")("utf-8")
+        .cast<std::string>();
   } catch (const py::error_already_set& error) {
-    if (!error.matches(PyExc_ValueError) && !error.matches(PyExc_RecursionError)) throw;
+    if (!error.matches(PyExc_ValueError) && !error.matches(PyExc_RecursionError) && !error.matches(PyExc_TypeError)) {
+      throw;
+    }
     fail("dict: can't be written as JSON ({})", std::string(py::str(error.value())));
   }
 }
 
 /// The file of a path, or of a shipped file's name.
 fs::path file_from(const py::handle& value, const char* folder) {
-  const py::module_ os = py::module_::import("os");
-  const py::object path = os.attr("fspath")(value);
-  try {
-    return named_file(os.attr("fsencode")(path).cast<std::string>(), folder);
-  } catch (const py::error_already_set& error) {
-    if (!error.matches(PyExc_UnicodeError)) throw;
-    fail("{}: can't be a path", std::string(py::str(py::module_::import("builtins").attr("ascii")(path))));
-  }
+  return named_file(path_from(value, folder), folder);
 }
 
 /// From a dict of a file's fields (JSON is YAML), a path, or a shipped file's name.
@@ -75,11 +82,11 @@ Spec spec_from(const py::handle& value, const char* folder) {
   return read_yaml<Spec>(file_from(value, folder));
 }
 
-std::shared_ptr<Sensor> make_sensor(const py::object& device, std::uint64_t unit, double deepest_mm, double widest_mm,
-                                    double membrane_um, bool friction, const std::string& cache,
+std::shared_ptr<Sensor> make_sensor(const py::object& device, const py::object& unit, double deepest_mm,
+                                    double widest_mm, double membrane_um, bool friction, const py::object& cache,
                                     const py::object& progress) {
   sim::VirtualSensorSettings settings;
-  settings.seed = unit;
+  settings.seed = seed_from(unit, "unit");
   settings.deepest_mm = deepest_mm;
   settings.widest_mm = widest_mm;
   settings.membrane_um = membrane_um;
@@ -90,17 +97,18 @@ std::shared_ptr<Sensor> make_sensor(const py::object& device, std::uint64_t unit
   check("deepest_mm", deepest_mm, Allowed::above_up_to(0.0, 100.0));
   check("widest_mm", widest_mm, Allowed::above_up_to(0.0, 100.0));
   check("membrane_um", membrane_um, Allowed::within(1.0, 1000.0));
-  checked_path(cache, "cache");
+  const std::string kept = cache.is_none() ? "" : path_from(cache, "cache");
   const Progress listener = progress_to(progress);
   sim::DeviceSpec spec = spec_from<sim::DeviceSpec>(device, "devices");
-  const fs::path folder = cache.empty() ? sim::default_cache_folder() : fs::path(cache);
+  const fs::path folder = kept.empty() ? sim::default_cache_folder() : fs::path(kept);
   return unlocked([&] { return std::make_shared<Sensor>(std::move(spec), folder, settings, listener); });
 }
 
 std::shared_ptr<Touch> press(const Sensor& sensor, const py::object& touched, std::optional<double> depth_mm,
                              std::optional<double> force_N, const py::object& at_mm, const py::object& angles_deg,
                              const py::object& pose, const py::object& shear_mm, const py::object& shear_N,
-                             double seconds, std::uint64_t noise_seed, int frame, bool look, bool truth) {
+                             double seconds, const py::object& noise_seed, const py::object& frame, bool look,
+                             bool truth) {
   const int given = (depth_mm ? 1 : 0) + (force_N ? 1 : 0) + (pose.is_none() ? 0 : 1);
   if (given != 1) fail("press: exactly one of depth_mm, force_N and pose says how far; {} of them are given", given);
   if (!shear_mm.is_none() && !shear_N.is_none()) fail("press: shear_mm and shear_N exclude each other");
@@ -129,10 +137,9 @@ std::shared_ptr<Touch> press(const Sensor& sensor, const py::object& touched, st
   if (!times.holds(seconds)) fail("seconds is {}; allowed is {}", seconds, times.text());
   order.seconds = seconds;
   sim::check(order);
+  const sim::TouchOptions options{look, truth, seed_from(noise_seed, "noise_seed"), frame_from(frame)};
   const SharedObject object = object_for(sensor, touched);
-  return unlocked([&] {
-    return std::make_shared<Touch>(sensor.press(object, order, {look, truth, noise_seed, checked_frame(frame)}));
-  });
+  return unlocked([&] { return std::make_shared<Touch>(sensor.press(object, order, options)); });
 }
 
 template <typename Rows>
@@ -191,7 +198,9 @@ SharedObject object_from(const py::handle& value) {
 SharedObject object_for(const Sensor& sensor, const py::handle& value) {
   const SharedObject object = object_from(value);
   const std::string warning = unlocked([&] { return sensor.object(object).warning(); });
-  if (!warning.empty() && PyErr_WarnEx(PyExc_UserWarning, warning.c_str(), 1) != 0) throw py::error_already_set();
+  if (!warning.empty() && PyErr_WarnEx(PyExc_UserWarning, text_of(warning).cast<std::string>().c_str(), 1) != 0) {
+    throw py::error_already_set();
+  }
   return object;
 }
 
@@ -206,11 +215,12 @@ void bind_sensor(py::module_& module) {
            }),
            py::arg("of"))
       .def_property_readonly(
-          "name", [](const sim::ObjectSpec& self) { return self.name; }, "As the object file has it.")
+          "name", [](const sim::ObjectSpec& self) { return text_of(self.name); }, "As the object file has it.")
       .def_property_readonly(
           "friction", [](const sim::ObjectSpec& self) { return self.friction; },
           "Coulomb's coefficient against the gel.")
-      .def("__repr__", [](const sim::ObjectSpec& self) { return fmt::format("<touchstone.Object '{}'>", self.name); });
+      .def("__repr__",
+           [](const sim::ObjectSpec& self) { return text_of(fmt::format("<touchstone.Object '{}'>", self.name)); });
 
   const auto of_touch = [](auto member) {
     return [member](const py::object& self) { return array_of(self.cast<Touch&>().of.*member); };
@@ -346,7 +356,7 @@ void bind_sensor(py::module_& module) {
            py::arg("widest_mm") = 0.5, py::arg("membrane_um") = 40.0, py::arg("friction") = false,
            py::arg("cache") = "", py::arg("progress") = py::none())
       .def_property_readonly(
-          "name", [](const Sensor& self) { return self.device().name; }, "As the device file has it.")
+          "name", [](const Sensor& self) { return text_of(self.device().name); }, "As the device file has it.")
       .def_property_readonly(
           "picture_shape",
           [](const Sensor& self) -> py::object {
@@ -368,7 +378,10 @@ void bind_sensor(py::module_& module) {
           "mm_per_px", [](const Sensor& self) { return unlocked([&] { return self.virtual_sensor().mm_per_px(); }); },
           "In the middle of the undeformed membrane.")
       .def_property_readonly(
-          "light", [](const Sensor& self) { return unlocked([&] { return self.virtual_sensor().light().reason; }); },
+          "light",
+          [](const Sensor& self) {
+            return text_of(unlocked([&] { return std::string(self.virtual_sensor().light().reason); }));
+          },
           "How pictures are lit, and why.")
       .def(
           "gel_from_pixel",
@@ -393,9 +406,10 @@ void bind_sensor(py::module_& module) {
           py::arg("place_mm"), "The inverse of gel_from_pixel.")
       .def(
           "background",
-          [](const Sensor& self, std::uint64_t noise_seed, int frame) {
-            checked_frame(frame);
-            return array_of(unlocked([&] { return self.virtual_sensor().background(noise_seed, frame); }));
+          [](const Sensor& self, const py::object& noise_seed, const py::object& frame) {
+            const std::uint64_t seed = seed_from(noise_seed, "noise_seed");
+            const int number = frame_from(frame);
+            return array_of(unlocked([&] { return self.virtual_sensor().background(seed, number); }));
           },
           py::kw_only(), py::arg("noise_seed") = 0, py::arg("frame") = 0,
           "The frame of the untouched device; noise by noise_seed and frame.")
@@ -425,7 +439,8 @@ void bind_sensor(py::module_& module) {
            "to gels that relax.\nnoise_seed, frame: choose the imager's noise.\nlook: make a picture at all. truth: "
            "with ideal, height and contact.\n\nRaises Error for a press that can't be had (gross slip, deeper than the "
            "gel) or shown (beyond deepest_mm).")
-      .def("__repr__", [](const Sensor& self) { return fmt::format("<touchstone.Sensor '{}'>", self.device().name); });
+      .def("__repr__",
+           [](const Sensor& self) { return text_of(fmt::format("<touchstone.Sensor '{}'>", self.device().name)); });
 }
 
 }  // namespace touchstone::python

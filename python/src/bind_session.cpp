@@ -110,8 +110,9 @@ void bind_session(py::module_& module) {
       .def_property_readonly("reading", &Session::reading, "Of the last step.")
       .def(
           "look",
-          [](Session& self, std::uint64_t noise_seed, std::optional<int> frame, bool picture, bool truth) {
-            return self.look({picture, truth, noise_seed, checked_frame(frame.value_or(0))}, !frame);
+          [](Session& self, const py::object& noise_seed, const py::object& frame, bool picture, bool truth) {
+            const int number = frame.is_none() ? 0 : frame_from(frame);
+            return self.look({picture, truth, seed_from(noise_seed, "noise_seed"), number}, frame.is_none());
           },
           py::kw_only(), py::arg("noise_seed") = 0, py::arg("frame") = py::none(), py::arg("picture") = true,
           py::arg("truth") = true,

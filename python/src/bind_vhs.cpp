@@ -15,12 +15,12 @@ using sensors::StiffnessForceModel;
 using sensors::TrackedBeads;
 using Tracker = Guarded<sensors::BeadTracker>;
 
-std::shared_ptr<Tracker> make_tracker(int grid, int roi_a_px, int roi_b_px, const std::string& polarity,
-                                      const py::object& centre_px) {
+std::shared_ptr<Tracker> make_tracker(const py::object& grid, const py::object& roi_a_px, const py::object& roi_b_px,
+                                      const std::string& polarity, const py::object& centre_px) {
   BeadTrackerSettings settings;
-  settings.grid = grid;
-  settings.roi_a_px = roi_a_px;
-  settings.roi_b_px = roi_b_px;
+  settings.grid = whole_number_from<int>(grid, "grid");
+  settings.roi_a_px = whole_number_from<int>(roi_a_px, "roi_a_px");
+  settings.roi_b_px = whole_number_from<int>(roi_b_px, "roi_b_px");
   if (polarity == "bright") {
     settings.appearance.polarity = sensors::BeadPolarity::kBright;
   } else if (polarity != "dark") {
@@ -30,10 +30,10 @@ std::shared_ptr<Tracker> make_tracker(int grid, int roi_a_px, int roi_b_px, cons
   return std::make_shared<Tracker>(settings);
 }
 
-py::dict train(const py::object& rest, const py::object& positions, const py::object& forces_N, int grid,
+py::dict train(const py::object& rest, const py::object& positions, const py::object& forces_N, const py::object& grid,
                const std::string& form) {
   sensors::ForceSamples samples;
-  samples.grid = grid;
+  samples.grid = whole_number_from<int>(grid, "grid");
   samples.rest = points2_from(rest, "rest");
   for_each_item(positions, "positions",
                 [&](const py::object& one) { samples.positions.push_back(points2_from(one, "positions")); });
@@ -96,9 +96,10 @@ void bind_vhs(py::module_& module) {
            py::arg("roi_b_px") = 30, py::arg("polarity") = "dark", py::arg("centre_px") = py::none())
       .def(
           "track",
-          [](Tracker& self, const py::object& frame, std::int64_t t_us) {
+          [](Tracker& self, const py::object& frame, const py::object& t_us) {
             const Picture picture = picture_from(frame, "frame");
-            return self.with([&](auto& tracker) { return TrackedBeads(tracker.track({picture.mat, t_us})); });
+            const auto time_us = whole_number_from(t_us, "t_us");
+            return self.with([&](auto& tracker) { return TrackedBeads(tracker.track({picture.mat, time_us})); });
           },
           py::arg("frame"), py::arg("t_us"), "The next frame, later than the last one: TrackedBeads.")
       .def(
@@ -119,13 +120,13 @@ void bind_vhs(py::module_& module) {
       "Force from bead positions by a matrix of stiffness coefficients; see train_stiffness.")
       .def_static(
           "load",
-          [](const std::string& path) {
+          [](const py::object& path) {
             return std::make_shared<StiffnessForceModel>(sensors::load_stiffness_model(needed_path(path, "path")));
           },
           py::arg("path"), "Reads a model file.")
       .def(
           "save",
-          [](const StiffnessForceModel& self, const std::string& path) {
+          [](const StiffnessForceModel& self, const py::object& path) {
             sensors::save(self, needed_path(path, "path"));
           },
           py::arg("path"), "Writes it, whole or not at all.")

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/error.h"
+#include "core/short_text.h"
 
 namespace touchstone::python {
 namespace {
@@ -17,6 +18,16 @@ std::string shape_text(const py::array& array) {
 
 std::string type_text(const py::handle& value) {
   return py::str(py::type::of(value));
+}
+
+/// A value as a message may show it. Its repr may fail: of an int with thousands of digits, or of a user's own class.
+std::string shown(const py::handle& value) {
+  const auto text = py::reinterpret_steal<py::object>(PyObject_ASCII(value.ptr()));
+  if (!text) {
+    PyErr_Clear();
+    return "one that can't be shown";
+  }
+  return short_text(text.cast<std::string>());
 }
 
 // OpenCV takes pictures of up to so many pixels a side; more of them in all are a mistake rather than a camera.
@@ -221,19 +232,22 @@ double number_from(const py::handle& value, const std::string& what) {
   const double number = PyFloat_AsDouble(value.ptr());
   if (PyErr_Occurred() != nullptr) {
     PyErr_Clear();
-    fail("{}: a number is needed, this is {} of {}", what, std::string(py::repr(value)), type_text(value));
+    fail("{}: a number is needed, this is {} of {}", what, shown(value), type_text(value));
   }
   return number;
 }
 
-std::int64_t whole_number_from(const py::handle& value, const std::string& what) {
+py::int_ whole_number_within(const py::handle& value, const std::string& what, const py::int_& low,
+                             const py::int_& high) {
   const auto index = py::reinterpret_steal<py::object>(PyNumber_Index(value.ptr()));
-  const std::int64_t number = index ? PyLong_AsLongLong(index.ptr()) : -1;
-  if (PyErr_Occurred() != nullptr) {
+  if (!index) {
     PyErr_Clear();
-    fail("{}: a whole number is needed, this is {} of {}", what, std::string(py::repr(value)), type_text(value));
+    fail("{}: a whole number is needed, this is {} of {}", what, shown(value), type_text(value));
   }
-  return number;
+  if (index < low || index > high) {
+    fail("{}: {} is not allowed; allowed is from {} to {}", what, shown(index), shown(low), shown(high));
+  }
+  return py::reinterpret_borrow<py::int_>(index);
 }
 
 py::sequence sequence_from(const py::handle& value, const char* what) {
@@ -250,20 +264,28 @@ void for_each_item(const py::handle& value, const char* what, const std::functio
   for (; iterator != py::iterator::sentinel(); ++iterator) use(py::reinterpret_borrow<py::object>(*iterator));
 }
 
-const std::string& checked_path(const std::string& path, const char* what) {
-  if (path.find('\0') != std::string::npos)
-    fail("{}: '{}' has a zero byte, which no path may have", what, path.c_str());
+std::string path_from(const py::handle& value, const char* what) {
+  PyObject* bytes = nullptr;
+  if (PyUnicode_FSConverter(value.ptr(), &bytes) == 0) {
+    const bool zero = PyErr_ExceptionMatches(PyExc_ValueError) != 0 && PyErr_ExceptionMatches(PyExc_UnicodeError) == 0;
+    PyErr_Clear();
+    if (zero) fail("{}: {} has a zero byte, which no path may have", what, shown(value));
+    fail("{}: a path is needed, this is {} of {}", what, shown(value), type_text(value));
+  }
+  return py::reinterpret_steal<py::bytes>(bytes);
+}
+
+std::string needed_path(const py::handle& value, const char* what) {
+  std::string path = path_from(value, what);
+  if (path.empty()) fail("{}: '' is no path", what);
   return path;
 }
 
-const std::string& needed_path(const std::string& path, const char* what) {
-  if (path.empty()) fail("{}: '' is no path", what);
-  return checked_path(path, what);
-}
-
-int checked_frame(int frame) {
-  if (frame < 0) fail("frame: {} is not allowed; allowed is at least 0", frame);
-  return frame;
+py::str text_of(const std::string& text) {
+  const auto size = static_cast<py::ssize_t>(text.size());
+  auto decoded = py::reinterpret_steal<py::str>(PyUnicode_DecodeUTF8(text.data(), size, "backslashreplace"));
+  if (!decoded) throw py::error_already_set();
+  return decoded;
 }
 
 Progress progress_to(const py::object& listener) {

@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <opencv2/core/mat.hpp>
 #include <optional>
@@ -92,16 +93,33 @@ RigidTransform pose_from(const py::handle& value, const char* what);
 /// What Python's own conversions refuse by an error that doesn't say which argument it is about.
 /// @throws Error naming `what`
 double number_from(const py::handle& value, const std::string& what);
-std::int64_t whole_number_from(const py::handle& value, const std::string& what);
+/// An int of Python within these bounds, for whole_number_from. @throws Error naming `what`
+py::int_ whole_number_within(const py::handle& value, const std::string& what, const py::int_& low,
+                             const py::int_& high);
+/// Neither 2.0 nor a text of digits is one. @throws Error naming `what`
+template <typename T = std::int64_t>
+T whole_number_from(const py::handle& value, const std::string& what, T low = std::numeric_limits<T>::min(),
+                    T high = std::numeric_limits<T>::max()) {
+  return whole_number_within(value, what, py::int_(low), py::int_(high)).cast<T>();
+}
 py::sequence sequence_from(const py::handle& value, const char* what);
 /// Calls `use` for each item of a list, a tuple, an array or whatever else can be gone through.
 void for_each_item(const py::handle& value, const char* what, const std::function<void(const py::object&)>& use);
-/// A path ends at a zero byte, so that another file would be taken. @throws Error naming `what`
-const std::string& checked_path(const std::string& path, const char* what);
+/// The bytes of a path: of a str (whatever bytes Python has put into it), of bytes or of what has `__fspath__`.
+/// @throws Error naming `what` for anything else, and for a zero byte, at which another file would be taken
+std::string path_from(const py::handle& value, const char* what);
 /// The same of a path that must not be empty.
-const std::string& needed_path(const std::string& path, const char* what);
-/// That chooses the noise. @throws Error
-int checked_frame(int frame);
+std::string needed_path(const py::handle& value, const char* what);
+/// What chooses the noise. @throws Error
+inline std::uint64_t seed_from(const py::handle& value, const char* what) {
+  return whole_number_from<std::uint64_t>(value, what);
+}
+inline int frame_from(const py::handle& value) {
+  return whole_number_from<int>(value, "frame", 0);
+}
+
+/// A text of ours, which may have a file's bytes in it: those that aren't UTF-8 are written as their codes.
+py::str text_of(const std::string& text);
 
 /// Hands progress to a Python function (None: nobody) and looks for Ctrl-C. Works from any thread.
 Progress progress_to(const py::object& listener);

@@ -10,7 +10,6 @@ its origin in the middle of the gel's undeformed outer surface and z out of the 
 so pressing gives a positive z. Pictures are BGR, as OpenCV's. See docs/python.md.
 """
 
-import os as _os
 import resource as _resource
 import warnings as _warnings
 
@@ -95,8 +94,8 @@ def generate(job, out, *, threads=0, timings=True, cache=None, shard=None, progr
     drawn_again (touches that couldn't be pressed).
     Raises Error for a mistake in the job, a folder with anything else in it, a full disk.
     """
-    return _core.generate(_os.fspath(job), _os.fspath(out), threads=threads, timings=timings,
-                          cache=_os.fspath(cache) if cache is not None else "", shard=shard or "", progress=progress)
+    return _core.generate(job, out, threads=threads, timings=timings, cache="" if cache is None else cache,
+                          shard=shard or "", progress=progress)
 
 
 def merge(job, out, *, progress=None):
@@ -105,7 +104,7 @@ def merge(job, out, *, progress=None):
     progress: as for generate. Returns a dict as generate does.
     Raises Error that names the files that are missing, or if the job isn't one that draws.
     """
-    return _core.merge(_os.fspath(job), _os.fspath(out), progress=progress)
+    return _core.merge(job, out, progress=progress)
 
 
 __all__ = [

@@ -62,7 +62,7 @@ class _Block:
         return _as_opencv(self._whole("background")).copy()
 
     def text(self, name):
-        return [one.decode("utf-8").rstrip("\0") for one in self._whole(name)]
+        return [one.decode("utf-8", "backslashreplace").rstrip("\0") for one in self._whole(name)]
 
 
 class DrawnFiles(SetFiles):
@@ -152,12 +152,11 @@ class DrawnFiles(SetFiles):
     def column(self, name, rows):
         import numpy
         rows = list(rows)
-        if not rows:
-            array = self._block(0).array(name)
-            shape = self.read(name, 0).shape
-            return numpy.empty((0, *shape), array.dtype)
         if name == "events":  # of as many as each sample has
             return [self.read(name, row) for row in rows]
+        if not rows:
+            like = numpy.asarray(self.read(name, 0))
+            return numpy.empty((0, *like.shape), like.dtype)
         result = None
         for place, row in enumerate(rows):
             value = self.read(name, row)

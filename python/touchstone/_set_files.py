@@ -86,7 +86,7 @@ def open_h5(path):
 def text_of(item, attribute):
     """A text attribute of an h5py object; ours have a fixed length, which h5py gives as bytes."""
     value = item.attrs[attribute]
-    return value.decode("utf-8") if isinstance(value, bytes) else str(value)
+    return value.decode("utf-8", "backslashreplace") if isinstance(value, bytes) else str(value)
 
 
 class SetFiles:

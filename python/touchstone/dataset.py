@@ -1,6 +1,7 @@
 """Reading data sets that `touchstone generate` or touchstone.generate made (docs/file-formats.md, docs/datasets.md)."""
 
 import operator
+import os
 import pathlib
 
 from ._drawn_files import DrawnFiles
@@ -13,7 +14,10 @@ _SOURCES = {"scenes": SceneFiles, "draw": DrawnFiles}
 
 
 def _open_set(folder):
-    path = pathlib.Path(folder) / "dataset.json"
+    try:
+        path = pathlib.Path(os.fsdecode(folder)) / "dataset.json"
+    except (TypeError, ValueError) as error:
+        raise Error(f"folder: a path is needed, this is {folder!r:.60} ({error})") from None
     manifest = read_manifest(path.parent)
     if manifest.get("format") != _FORMAT:
         raise Error(f"{path}: format: '{manifest.get('format')}' isn't a data set's; allowed is '{_FORMAT}'", str(path))

@@ -1,5 +1,8 @@
 #include "sim/files/image_module.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
@@ -51,6 +54,27 @@ int write_bytes(const char* path, const std::vector<unsigned char>& bytes, char*
   return 0;
 }
 
+/// A name for a file that OpenImageIO takes as it is: what stands behind a "?" it would take for settings of a reader.
+class OpenedFile {
+ public:
+  explicit OpenedFile(const char* path) : name_(path) {
+    if (name_.find('?') == std::string::npos) return;
+    descriptor_ = open(path, O_RDONLY | O_CLOEXEC);
+    name_ = "/proc/self/fd/" + std::to_string(descriptor_);
+  }
+  ~OpenedFile() {
+    if (descriptor_ >= 0) close(descriptor_);
+  }
+  OpenedFile(const OpenedFile&) = delete;
+  OpenedFile& operator=(const OpenedFile&) = delete;
+
+  const std::string& name() const { return name_; }
+
+ private:
+  std::string name_;
+  int descriptor_ = -1;
+};
+
 int write(const TouchstoneImageToWrite& image, char* message, std::size_t size) {
   const auto output = OIIO::ImageOutput::create(image.format);
   if (!output) return failed(OIIO::geterror(), message, size);
@@ -82,7 +106,8 @@ int read(const char* path, const char* key, void* (*accept)(void*, const Touchst
   OIIO::ImageSpec wishes;
   wishes.attribute("oiio:UnassociatedAlpha", 1);  // colours as they're stored, not multiplied by alpha
   if (const std::string damage = touchstone::image_damage(path); !damage.empty()) return failed(damage, message, size);
-  const auto input = OIIO::ImageInput::open(path, &wishes);
+  const OpenedFile plainly(path);
+  const auto input = OIIO::ImageInput::open(plainly.name(), &wishes);
   if (!input) return failed(OIIO::geterror(), message, size);
   const OIIO::ImageSpec& spec = input->spec();
   if (spec.width < 1 || spec.height < 1 || spec.width > kLongestSide || spec.height > kLongestSide || spec.depth > 1 ||

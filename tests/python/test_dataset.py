@@ -73,6 +73,11 @@ def test_splits_samples_and_columns_agree(folder):
     assert "wrench" in data.array_names()
     assert ts.Dataset(folder, transform=lambda sample: sample["wrench"][2])[9] == wrench[9, 2]
     data.verify()
+    empty = ts.Dataset(folder, "validate", columns=("frame", "ideal", "wrench"))
+    for name in ("frame", "ideal", "wrench", "surface_displacement_mm", "scene"):
+        assert empty.array(name).shape == (0, *data.array(name).shape[1:]), name
+        assert empty.array(name).dtype == data.array(name).dtype, name
+    assert empty.groups().shape == (0,) and list(empty) == []
 
 
 def test_forces_of_frames_are_those_of_presses(folder):

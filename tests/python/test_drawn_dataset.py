@@ -96,6 +96,15 @@ def test_splits_and_groups_go_by_unit(folder, truth):
     assert parts["test"][2]["sample"] == np.flatnonzero(truth["split"] == 2)[2]
 
 
+def test_an_empty_split_has_columns_without_rows(folder):
+    empty, whole = ts.Dataset(folder, "validate"), ts.Dataset(folder)
+    assert len(empty) == 0 and empty.groups().shape == (0,)
+    for name in ("frame", "height", "contact", "background", "wrench", "split", "drawn/force_N"):
+        assert empty.array(name).shape == (0, *whole.array(name).shape[1:]), name
+        assert empty.array(name).dtype == whole.array(name).dtype, name
+    assert empty._files.column("events", []) == [], "of as many as each sample has: a list"
+
+
 def test_splits_may_go_by_sample(tmp_path, examples):
     job = tmp_path / "job.yaml"
     job.write_text(JOB.format(examples=examples, by="sample"))

@@ -261,6 +261,22 @@ TEST_F(ImageFile, DamagedFilesAreRefusedByName) {
   EXPECT_THROW(read_exr(folder_ / "a.png"), Error);
 }
 
+TEST_F(ImageFile, NamesAreTakenAsTheyAre) {
+  const cv::Mat image = pattern(CV_8UC3);
+  for (const char* name : {"a?b=1.png", "?.png", "a*[0-9].png", "a%04d#.png", "a\nb.png", "\xff.png", "a?b"}) {
+    fs::create_directories(folder_ / name / name);
+    write_png(folder_ / name / "c.png", image);
+    EXPECT_TRUE(same(read_image(folder_ / name / "c.png"), image)) << name;
+    write_png(folder_ / name / "c?d.png", image, {{"unit", "DN"}});
+    EXPECT_TRUE(same(read_image(folder_ / name / "c?d.png"), image)) << name;
+    EXPECT_EQ(image_metadata(folder_ / name / "c?d.png", "unit"), "DN");
+    write_whole_file(folder_ / name / "c?d.jpg", render::jpeg_bytes(image, {}));
+    EXPECT_EQ(read_image(folder_ / name / "c?d.jpg").size(), image.size()) << name;
+  }
+  write_whole_file(folder_ / "text?.png", "this is no picture\n");
+  EXPECT_NE(complaint(folder_ / "text?.png"), "");
+}
+
 TEST_F(ImageFile, CutPicturesOfEveryKindAreRefusedByName) {
   const cv::Mat frame = frame_like();
   cv::Mat grey;
