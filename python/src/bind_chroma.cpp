@@ -67,7 +67,8 @@ py::array places_of(const ColourMarkerReading& reading) {
 
 /// Samples are (reading, marker, displacement_mm, series). Flawed markers are an error, as in sensors::calibrate_hue.
 std::shared_ptr<HueModel> calibrate(const ColourMarkerReading& rest, const py::object& samples, double spacing_mm,
-                                    double viewing_distance_mm, const std::string& form) {
+                                    double viewing_distance_mm, const py::object& form_name) {
+  const std::string form = text_from(form_name, "form");
   sensors::HueCalibrationSettings settings;
   settings.spacing_mm = spacing_mm;
   settings.parallax.viewing_distance_mm = viewing_distance_mm;

@@ -66,7 +66,8 @@ py::dict dict_of(const datasets::GenerateReport& report) {
 }
 
 py::dict generate(const py::object& job_file, const py::object& out_folder, const py::object& threads, bool timings,
-                  const py::object& cache_folder, const std::string& shard, const py::object& progress) {
+                  const py::object& cache_folder, const py::object& shard_text, const py::object& progress) {
+  const std::string shard = text_from(shard_text, "shard");
   const std::string job = needed_path(job_file, "job"), out = needed_path(out_folder, "out");
   const std::string cache = path_from(cache_folder, "cache");
   const Progress listener = progress_to(progress);

@@ -32,14 +32,14 @@ sensors::SlopeRegressor regressor_named(const std::string& name) {
 
 /// Frames of pressed balls, each with the outline (u, v, radius in pixels) of its touched part, or None to look for it.
 py::tuple calibrate_height(const py::object& frames, const py::object& ball_diameters_mm, const py::object& background,
-                           double mm_per_px, const py::object& circles, const std::string& correction,
-                           const std::string& slopes, double gel_thickness_mm) {
+                           double mm_per_px, const py::object& circles, const py::object& correction,
+                           const py::object& slopes, double gel_thickness_mm) {
   const GivenPresses given = presses_from(frames, ball_diameters_mm, circles);
   const std::vector<Picture> rest = pictures_from(background, "background");
   sensors::HeightCalibrationSettings settings;
   settings.mm_per_px = mm_per_px;
-  settings.correction = correction_named(correction);
-  settings.slopes = regressor_named(slopes);
+  settings.correction = correction_named(text_from(correction, "correction"));
+  settings.slopes = regressor_named(text_from(slopes, "slopes"));
   settings.gel_thickness_mm = gel_thickness_mm;
   if (!kThicknesses.holds(gel_thickness_mm)) {
     fail("gel_thickness_mm: {} is not allowed; allowed is {}", gel_thickness_mm, kThicknesses.text());
@@ -77,7 +77,8 @@ sensors::HeightResult copy_of(const sensors::HeightResult& result) {
   return copy;
 }
 
-std::shared_ptr<Heights> make_estimator(const HeightModel& model, const std::string& border) {
+std::shared_ptr<Heights> make_estimator(const HeightModel& model, const py::object& border_name) {
+  const std::string border = text_from(border_name, "border");
   sensors::HeightSettings settings;
   if (border == "free") {
     settings.border = sensors::HeightBorder::free;

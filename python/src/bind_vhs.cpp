@@ -16,7 +16,8 @@ using sensors::TrackedBeads;
 using Tracker = Guarded<sensors::BeadTracker>;
 
 std::shared_ptr<Tracker> make_tracker(const py::object& grid, const py::object& roi_a_px, const py::object& roi_b_px,
-                                      const std::string& polarity, const py::object& centre_px) {
+                                      const py::object& polarity_name, const py::object& centre_px) {
+  const std::string polarity = text_from(polarity_name, "polarity");
   BeadTrackerSettings settings;
   settings.grid = whole_number_from<int>(grid, "grid");
   settings.roi_a_px = whole_number_from<int>(roi_a_px, "roi_a_px");
@@ -31,7 +32,8 @@ std::shared_ptr<Tracker> make_tracker(const py::object& grid, const py::object& 
 }
 
 py::dict train(const py::object& rest, const py::object& positions, const py::object& forces_N, const py::object& grid,
-               const std::string& form) {
+               const py::object& form_name) {
+  const std::string form = text_from(form_name, "form");
   sensors::ForceSamples samples;
   samples.grid = whole_number_from<int>(grid, "grid");
   samples.rest = points2_from(rest, "rest");

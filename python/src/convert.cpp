@@ -281,6 +281,18 @@ std::string needed_path(const py::handle& value, const char* what) {
   return path;
 }
 
+std::string text_from(const py::handle& value, const char* what) {
+  if (!py::isinstance<py::str>(value))
+    fail("{}: a text is needed, this is {} of {}", what, shown(value), type_text(value));
+  py::ssize_t size = 0;
+  const char* const text = PyUnicode_AsUTF8AndSize(value.ptr(), &size);
+  if (text == nullptr) {
+    PyErr_Clear();
+    fail("{}: {} has something in it that isn't a letter of Unicode", what, shown(value));
+  }
+  return {text, static_cast<std::size_t>(size)};
+}
+
 py::str text_of(const std::string& text) {
   const auto size = static_cast<py::ssize_t>(text.size());
   auto decoded = py::reinterpret_steal<py::str>(PyUnicode_DecodeUTF8(text.data(), size, "backslashreplace"));

@@ -118,6 +118,8 @@ inline int frame_from(const py::handle& value) {
   return whole_number_from<int>(value, "frame", 0);
 }
 
+/// A text of Python as UTF-8. @throws Error naming `what` for anything else, and for halves of letters
+std::string text_from(const py::handle& value, const char* what);
 /// A text of ours, which may have a file's bytes in it: those that aren't UTF-8 are written as their codes.
 py::str text_of(const std::string& text);
 

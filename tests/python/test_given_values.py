@@ -127,6 +127,19 @@ def test_whole_numbers_are_refused_by_name(sensor, ball, examples, tmp_path):
         assert sensor.background(noise_seed=good).shape == (60, 80, 3)
 
 
+def test_names_that_are_no_text_are_refused_by_name(tmp_path):
+    points = np.zeros((4, 2))
+    for bad in ("\udcff", "\ud800", b"dark", 3, None, ["dark"]):
+        for name, call in (("polarity", lambda: ts.BeadTracker(polarity=bad)),
+                           ("form", lambda: ts.train_stiffness(points, [points], np.zeros((1, 3)), grid=2, form=bad)),
+                           ("correction", lambda: ts.calibrate_height([np.zeros((9, 9, 3), np.uint8)], [2.0],
+                            [np.zeros((9, 9, 3), np.uint8)], mm_per_px=0.1, correction=bad))):
+            with pytest.raises(ts.Error, match=f"^{name}: "):
+                call()
+    with pytest.raises(ts.Error, match="^shard: "):
+        ts.generate("job.yaml", tmp_path / "out", shard="\udcff")
+
+
 def test_bytes_that_arent_utf8_are_named(tmp_path):
     file = tmp_path / "ball.yaml"
     file.write_bytes(b"name: b\xe4ll # \xb5\nshape: {type: sphere, radius_mm: 2}\n")
