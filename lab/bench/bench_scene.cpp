@@ -142,9 +142,10 @@ sim::SceneSpec bench_scene(const sim::DeviceSpec& device, const BenchPresses& pr
   return scene;
 }
 
-sim::CameraSpec middle_of(sim::CameraSpec camera, int most_pixels) {
+sim::DeviceSpec middle_of(sim::DeviceSpec device, int most_pixels) {
+  sim::CameraSpec& camera = *device.camera;
   const double pixels = static_cast<double>(camera.width) * camera.height;
-  if (pixels <= most_pixels) return camera;
+  if (pixels <= most_pixels) return device;
   const double shrink = std::sqrt(most_pixels / pixels);
   // Even steps on either side keep a mosaic's pattern where it is.
   const auto less = [&](int side) {
@@ -157,9 +158,14 @@ sim::CameraSpec middle_of(sim::CameraSpec camera, int most_pixels) {
     (*lens->camera_matrix)[2] -= 0.5 * (camera.width - width);
     (*lens->camera_matrix)[3] -= 0.5 * (camera.height - height);
   }
+  if (!device.background.empty()) {
+    const cv::Rect middle((camera.width - width) / 2, (camera.height - height) / 2, width, height);
+    device.background = device.background(middle).clone();
+  }
+  device.residual.reset();
   camera.width = width;
   camera.height = height;
-  return camera;
+  return device;
 }
 
 SceneRun run_scene(const sim::SceneSpec& scene, const fem::Compliance& gel, bool whole) {

@@ -55,8 +55,9 @@ double force_difference(const std::vector<Eigen::Vector3d>& forces, const std::v
 sim::SceneSpec bench_scene(const sim::DeviceSpec& device, const BenchPresses& presses, const sim::PressSpec& spec,
                            std::uint64_t seed);
 
-/// A camera of at most so many pixels out of the middle of this one, with all else as it was.
-sim::CameraSpec middle_of(sim::CameraSpec camera, int most_pixels);
+/// The device with a camera of at most so many pixels out of the middle of its own, and its background's part of them.
+/// Without its residual map, which is of whole pictures. @pre it has a camera
+sim::DeviceSpec middle_of(sim::DeviceSpec device, int most_pixels);
 
 /// What a scene came to.
 struct SceneRun {

@@ -259,8 +259,7 @@ DeviceBench bench_device(const sim::DeviceSpec& device, const BenchSettings& set
   BenchParts parts;
   parts.settings = settings;
   parts.whole_device = device;
-  parts.device = device;
-  if (device.camera) parts.device.camera = middle_of(*device.camera, settings.most_pixels);
+  parts.device = device.camera ? middle_of(device, settings.most_pixels) : device;
   tell("the device's own gel");
   MadeGel own = make_gel(device);
   parts.own_gel = std::move(own.gel);

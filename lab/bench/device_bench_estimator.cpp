@@ -227,8 +227,7 @@ Family force_family(const sim::DeviceSpec& device, const sim::ObjectSpec& object
   const sensors::BeadTrackerSettings tracker = tracker_settings(device);
   const double part = kCells * tracker.roi_a_px / std::min(device.camera->width, device.camera->height);
   if (part < 1.0) {
-    family.device.camera =
-        middle_of(*device.camera, static_cast<int>(part * part * device.camera->width * device.camera->height));
+    family.device = middle_of(device, static_cast<int>(part * part * device.camera->width * device.camera->height));
   }
   family.words = fmt::format(
       "the stiffness model of forces from {} x {} beads (touchstone calibrate vhs --stop converged), trained on {} "

@@ -62,12 +62,12 @@ WatchedEvents watch(sim::SceneSpec scene, const fem::Compliance& gel, double ste
 /// A setting of each step, until one would take too long. The finest is what the others are held against.
 void watch_in_steps(const BenchParts& parts, sim::SceneSpec scene, const Progress& progress, BenchCurve& curve) {
   // What the finest step takes with few pixels says how many may be had: for half of the limit, as it's a guess.
-  const sim::CameraSpec whole = *scene.device.camera;
-  scene.device.camera = middle_of(whole, kFewestEventPixels);
+  const sim::DeviceSpec whole = scene.device;
+  scene.device = middle_of(whole, kFewestEventPixels);
   if (progress) progress("event step", 0, kEventSteps.size());
   const double pilot_s = watch(scene, parts.own_gel, kEventSteps.back()).seconds;
   const double pixels = kFewestEventPixels * std::max(1.0, 0.5 * kMostSeconds / pilot_s);
-  scene.device.camera = middle_of(whole, static_cast<int>(std::min(pixels, 1e9)));
+  scene.device = middle_of(whole, static_cast<int>(std::min(pixels, 1e9)));
 
   std::vector<WatchedEvents> watched;
   for (const double step : kEventSteps) {

@@ -81,11 +81,12 @@ TEST(BenchPresses, LieWithinAnEdgeAndAFifthOfTheDepth) {
 }
 
 TEST(MiddleOf, KeepsTheAxisAndTheMosaic) {
-  sim::CameraSpec camera;
+  sim::DeviceSpec device;
+  sim::CameraSpec& camera = device.camera.emplace();
   camera.width = 1456;
   camera.height = 1088;
   camera.optics.emplace<sim::LensSpec>().camera_matrix = Eigen::Vector4d(2000, 2000, 731.5, 541.5);
-  const sim::CameraSpec middle = middle_of(camera, 320 * 240);
+  const sim::CameraSpec middle = *middle_of(device, 320 * 240).camera;
   const Eigen::Vector4d matrix = std::get<sim::LensSpec>(middle.optics).camera_matrix.value();
   EXPECT_LE(middle.width * middle.height, 320 * 240);
   EXPECT_GT(middle.width * middle.height, 310 * 232);
@@ -93,7 +94,24 @@ TEST(MiddleOf, KeepsTheAxisAndTheMosaic) {
   EXPECT_EQ((camera.height - middle.height) % 4, 0);
   EXPECT_EQ(matrix[2] - 0.5 * middle.width, 731.5 - 0.5 * camera.width);
   EXPECT_EQ(matrix[3] - 0.5 * middle.height, 541.5 - 0.5 * camera.height);
-  EXPECT_EQ(middle_of(middle, 320 * 240).width, middle.width);
+  EXPECT_EQ(middle_of(middle_of(device, 320 * 240), 320 * 240).camera->width, middle.width);
+}
+
+TEST(MiddleOf, HasItsPartOfTheBackground) {
+  sim::DeviceSpec device;
+  device.camera.emplace().width = 64;
+  device.camera->height = 48;
+  device.background = cv::Mat(48, 64, CV_8UC3);
+  for (int v = 0; v < 48; ++v) {
+    for (int u = 0; u < 64; ++u) {
+      device.background.at<cv::Vec3b>(v, u) = {static_cast<unsigned char>(u), static_cast<unsigned char>(v), 0};
+    }
+  }
+  const sim::DeviceSpec middle = middle_of(device, 32 * 24);
+  ASSERT_EQ(middle.background.size(), cv::Size(middle.camera->width, middle.camera->height));
+  EXPECT_EQ(middle.background.at<cv::Vec3b>(0, 0),
+            cv::Vec3b(static_cast<unsigned char>((64 - middle.camera->width) / 2),
+                      static_cast<unsigned char>((48 - middle.camera->height) / 2), 0));
 }
 
 const BenchCurve& curve(const DeviceBench& bench, const std::string& name) {
