@@ -281,7 +281,7 @@ std::string YamlReader::scalar(const char* kind) const {
   if (describing()) return node_->place->text();
   if (!node_->yaml.IsScalar()) node_->refuse("{} is needed here", kind);
   const std::string& text = node_->yaml.Scalar();
-  // Comments may have any bytes; what is read is written into manifests and told to Python.
+  // Comments may have any bytes; what is read is written into manifests and handed to Python.
   if (!is_utf8(text)) node_->refuse("'{}' isn't UTF-8; save the file as UTF-8", short_text(text));
   return text;
 }

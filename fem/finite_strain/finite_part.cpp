@@ -4,7 +4,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <iterator>
 #include <limits>
@@ -12,6 +11,7 @@
 
 #include "core/error.h"
 #include "fem/contact/tip_gap.h"
+#include "fem/finite_strain/finite_part_iterate.h"
 #include "fem/finite_strain/finite_system.h"
 #include "fem/finite_strain/finite_tangent.h"
 
@@ -30,7 +30,6 @@ constexpr double kLeastShrink = 0.2;  // of the least J in one Newton step
 constexpr double kLeastRatio = 0.1;   // J: below, elements deform as the gel can't
 constexpr double kBalanced = 1e-8;    // residual over the elements' forces
 constexpr double kAtRest = 1e-4;      // of the elements' forces at a part's start: below, a gel is as good as at rest
-constexpr int kFacePasses = 3;        // over an elastic object's face
 constexpr double kReach = 0.5;        // of a vertex's own size: open gaps below this are candidates
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -46,31 +45,6 @@ Eigen::Matrix3d axes_along(const Eigen::Vector3d& direction) {
   return axes;
 }
 
-/// The gradients along a surface of what its corners have, as means over the triangles about each.
-Eigen::MatrixX3d vertex_slopes(const std::vector<Eigen::Vector3d>& corners,
-                               const std::vector<std::array<Eigen::Index, 3>>& triangles,
-                               const Eigen::VectorXd& values) {
-  Eigen::MatrixX3d slopes = Eigen::MatrixX3d::Zero(values.size(), 3);
-  Eigen::VectorXd areas = Eigen::VectorXd::Zero(values.size());
-  for (const auto& t : triangles) {
-    const Eigen::Vector3d twice_area = (corners[t[1]] - corners[t[0]]).cross(corners[t[2]] - corners[t[0]]);
-    const double size = twice_area.norm();
-    if (!(size > 0.0)) continue;
-    Eigen::Vector3d slope = Eigen::Vector3d::Zero();  // times the size
-    for (int k = 0; k < 3; ++k) {
-      slope += values[t[k]] / size * twice_area.cross(corners[t[(k + 2) % 3]] - corners[t[(k + 1) % 3]]);
-    }
-    for (const Eigen::Index k : t) {
-      slopes.row(k) += slope.transpose();
-      areas[k] += size;
-    }
-  }
-  for (Eigen::Index k = 0; k < values.size(); ++k) {
-    if (areas[k] > 0.0) slopes.row(k) /= areas[k];
-  }
-  return slopes;
-}
-
 std::vector<int> forced_axes(const PartTarget& target) {
   std::vector<int> axes;
   for (int a = 0; a < 3; ++a) {
@@ -80,72 +54,6 @@ std::vector<int> forced_axes(const PartTarget& target) {
 }
 
 }  // namespace
-
-FiniteSnapshot untouched(const FiniteGel& gel, const RigidTransform& pose) {
-  const auto n = static_cast<Eigen::Index>(gel.rest.vertices.size());
-  FiniteSnapshot s;
-  s.pose = pose;
-  s.elastic = gel.problem.at_rest();
-  s.pressure = Eigen::VectorXd::Zero(n);
-  s.shear = Eigen::MatrixX3d::Zero(n, 3);
-  s.state.assign(gel.rest.vertices.size(), NodeState::open);
-  return s;
-}
-
-Eigen::MatrixX3d traction_forces(const FiniteGel& gel, const FiniteSnapshot& at) {
-  Eigen::MatrixX3d forces = gel.coupling.transpose() * at.shear;
-  for (Eigen::Index v = 0; v < at.pressure.size(); ++v) {
-    if (at.pressure[v] == 0.0) continue;
-    for (RowSparse::InnerIterator it(at.gap.gradient, v); it; ++it) {
-      forces(it.col() / 3, it.col() % 3) += at.pressure[v] * it.value();
-    }
-  }
-  return forces;
-}
-
-Eigen::MatrixX3d bulge_forces(const FiniteGel& gel, const FiniteSnapshot& at) {
-  Eigen::MatrixX3d forces = Eigen::MatrixX3d::Zero(gel.space.nodes, 3);
-  for (const EdgeBulge& bulge : at.gap.bulges) {
-    for (int i = 0; i < 3; ++i) {
-      forces.row(bulge.nodes[i]) -= (bulge.stiffness * bulge.value) * bulge.gradient[i].transpose();
-    }
-  }
-  return forces;
-}
-
-Eigen::Vector3d traction_at(const FiniteGel& gel, const FiniteSnapshot& at, int vertex) {
-  return at.pressure[vertex] * at.gap.direction.row(vertex).transpose() / gel.rest.weight[vertex] +
-         at.shear.row(vertex).transpose();
-}
-
-/// An elastic object's own compliance, seen by the hats of some vertices where the gel's surface is.
-struct FinitePartSolver::Soft {
-  std::vector<int> vertices;                           ///< rising
-  std::vector<std::array<Eigen::Index, 3>> triangles;  ///< of the surface, between them: places in `vertices`
-  Eigen::MatrixXd compliance;                          ///< 3 m x 3 m, mm^3 per MPa, gel frame
-
-  Eigen::Index place(int vertex) const {
-    const auto it = std::lower_bound(vertices.begin(), vertices.end(), vertex);
-    return it != vertices.end() && *it == vertex ? it - vertices.begin() : -1;
-  }
-};
-
-/// One Newton iterate, and what is known there.
-struct FinitePartSolver::Iterate {
-  FiniteSnapshot at;
-  GapLines lines;
-  std::shared_ptr<const Soft> soft;                  ///< of an elastic object, along these lines
-  Eigen::MatrixX3d face;                             ///< n x 3, likewise: how what it gives changes along the surface
-  std::vector<Eigen::Matrix3d> axes;                 ///< per vertex; only where it has a gap
-  Eigen::VectorXd inside;                            ///< residual without the tractions of contact
-  Eigen::Vector3d bulges = Eigen::Vector3d::Zero();  ///< sum of bulge_forces, N
-  Eigen::VectorXd tangential_scale;                  ///< mm^3 per MPa, per vertex, of the last compliance
-  double balance = 0.0;                              ///< residual over the elements' forces
-  double size = 0.0;                                 ///< those forces
-  double least_size = 0.0;                           ///< what `balance` takes for them at least: a gel that is let go
-                                                     ///< comes to rest, where there are none
-  double least = 0.0;                                ///< J
-};
 
 /// A step: unknowns and shifts without units, and the tractions at its end.
 struct FinitePartSolver::Step {
@@ -212,102 +120,6 @@ void FinitePartSolver::evaluate(const GapLines* held, Iterate& iterate, PartEffo
   iterate.inside = residual.values - over_unknowns(gel_, bulges);
   iterate.size = std::max({residual.scale, outside.norm(), iterate.least_size});
   iterate.balance = iterate.size > 0.0 ? (iterate.inside - outside).norm() / iterate.size : 0.0;
-}
-
-/// What the object's surface gives way under the iterate's tractions, and the gaps from where it is then. Gel and
-/// object meet where the gel's deformed surface is, along its normals; as the gap's lines, that stays near the answer.
-/// What is given changes along the surface: so much is the object's face turned, and contact acts along it. Without
-/// that the force isn't the derivative of the stored energy (6 % off with a ball as soft as the gel, a third of the gel
-/// deep, on any mesh).
-void FinitePartSolver::give_way(bool anew, Iterate& iterate) const {
-  FiniteSnapshot& at = iterate.at;
-  const auto place_of = [&](int v) -> Eigen::Vector3d {
-    return gel_.rest.vertices[v] + at.elastic.displacement.row(gel_.outer.mesh_vertex[v]).transpose();
-  };
-  std::vector<int> wanted = with_those_beside(at, candidates(at));
-  const bool covered = iterate.soft && std::includes(iterate.soft->vertices.begin(), iterate.soft->vertices.end(),
-                                                     wanted.begin(), wanted.end());
-  if (anew || !covered) {
-    ContactSurface deformed = gel_.rest;
-    for (int v = 0; v < n_; ++v) deformed.vertices[v] = place_of(v);
-    deformed.normals = iterate.lines.normals;
-    const auto m = static_cast<Eigen::Index>(wanted.size());
-    auto soft = std::make_shared<Soft>();
-    soft->vertices = std::move(wanted);
-    soft->compliance = Eigen::MatrixXd::Zero(3 * m, 3 * m);
-    for (const auto& t : gel_.rest.triangles) {
-      const std::array<Eigen::Index, 3> places = {soft->place(t[0]), soft->place(t[1]), soft->place(t[2])};
-      if (*std::min_element(places.begin(), places.end()) >= 0) soft->triangles.push_back(places);
-    }
-    soft_->add_to(soft->compliance, 1.0, deformed, soft->vertices, std::vector<char>(soft->vertices.size(), 1),
-                  std::vector<Eigen::Matrix3d>(soft->vertices.size(), Eigen::Matrix3d::Identity()), at.pose, {},
-                  nullptr);
-    iterate.soft = std::move(soft);
-  }
-  const Soft& soft = *iterate.soft;
-  const auto m = std::ssize(soft.vertices);
-  const auto give = [&] {
-    Eigen::VectorXd tractions(3 * m);
-    for (Eigen::Index k = 0; k < m; ++k) tractions.segment<3>(3 * k) = traction_at(gel_, at, soft.vertices[k]);
-    const Eigen::VectorXd given = soft.compliance * tractions;
-    at.given = Eigen::MatrixX3d::Zero(n_, 3);
-    for (Eigen::Index k = 0; k < m; ++k) at.given.row(soft.vertices[k]) = given.segment<3>(3 * k).transpose();
-  };
-  const Eigen::MatrixX3d rigid = at.gap.direction;
-  if (anew) {
-    std::vector<Eigen::Vector3d> corners;
-    for (const int v : soft.vertices) corners.push_back(place_of(v));
-    // What is given and how the face turns depend on each other, weakly.
-    for (int pass = 0; pass < kFacePasses; ++pass) {
-      give();
-      Eigen::VectorXd along(m);  // mm
-      for (Eigen::Index k = 0; k < m; ++k) {
-        const int v = soft.vertices[k];
-        const double weight = gel_.rest.weight[v];
-        along[k] = at.gap.direction.row(v).dot(at.given.row(v)) / (weight * weight);
-      }
-      const Eigen::MatrixX3d slopes = vertex_slopes(corners, soft.triangles, along);
-      iterate.face = Eigen::MatrixX3d::Zero(n_, 3);
-      for (Eigen::Index k = 0; k < m; ++k) iterate.face.row(soft.vertices[k]) = slopes.row(k);
-      at.gap.direction = rigid + gel_.rest.weight.asDiagonal() * iterate.face;
-    }
-  } else {
-    at.gap.direction += gel_.rest.weight.asDiagonal() * iterate.face;
-  }
-  give();
-  std::vector<Eigen::Triplet<double>> turned;
-  for (const int v : soft.vertices) {
-    at.gap.weighted[v] += at.gap.direction.row(v).dot(at.given.row(v)) / gel_.rest.weight[v];
-    for (RowSparse::InnerIterator it(gel_.coupling, v); it; ++it) {
-      for (int a = 0; a < 3; ++a) turned.emplace_back(v, 3 * it.col() + a, it.value() * iterate.face(v, a));
-    }
-  }
-  RowSparse by_face(at.gap.gradient.rows(), at.gap.gradient.cols());
-  by_face.setFromTriplets(turned.begin(), turned.end());
-  at.gap.gradient += by_face;
-}
-
-/// Adds the object's part for the block's rows of laws, as many a vertex as in LawRows. @pre an elastic object, which
-/// the iterate's `soft` covers
-void FinitePartSolver::add_given(const Iterate& iterate, const std::vector<int>& block, int components,
-                                 Eigen::MatrixXd& compliance) const {
-  const Soft& soft = *iterate.soft;
-  const auto m = std::ssize(block);
-  const Eigen::Index c = components;
-  std::vector<Eigen::Matrix3d> laws;  // rows: how the vertex's gap and slips change with what is given there
-  std::vector<Eigen::Index> places;
-  for (const int v : block) {
-    Eigen::Matrix3d rows = iterate.axes[v].transpose();
-    rows.row(0) = iterate.at.gap.direction.row(v) / gel_.rest.weight[v];
-    laws.push_back(rows);
-    places.push_back(soft.place(v));
-  }
-  for (Eigen::Index j = 0; j < m; ++j) {
-    for (Eigen::Index i = 0; i < m; ++i) {
-      const Eigen::Matrix3d own = soft.compliance.block<3, 3>(3 * places[i], 3 * places[j]);
-      compliance.block(c * i, c * j, c, c) += (laws[i] * own * laws[j].transpose()).topLeftCorner(c, c);
-    }
-  }
 }
 
 /// These and the vertices beside them that have a gap, rising.

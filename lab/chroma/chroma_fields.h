@@ -32,12 +32,11 @@ struct FieldSummary {
 
 /// Estimates each frame, in their order, and writes FOLDER/displacements.csv and, if `forces` are given,
 /// FOLDER/forces.csv when all are done (docs/file-formats.md, "Recorded frames"). The folder is made if it isn't
-/// there.
+/// there. A frame that can't be read or is unfit (see ColourMarkerFinder) has one line, whose `flaw` says what is
+/// wrong.
 /// @param rest the picture of the unloaded sensor
-/// A frame that can't be read or is unfit (see ColourMarkerFinder) has one line, whose `flaw` says what is wrong.
-/// @throws Error naming the picture at rest if it is so, or if all frames are; for a model that doesn't fit the grid,
-/// or
-///   a compliance of another grid or another spacing than the model's
+/// @throws Error naming the picture at rest if it can't be read or is unfit, or if all frames are; for a model that
+///   doesn't fit the grid, or a compliance of another grid or another spacing than the model's
 FieldSummary write_chroma_fields(const sensors::HueModel& model, const Eigen::Vector2i& grid,
                                  const std::filesystem::path& rest, const std::vector<std::filesystem::path>& frames,
                                  const std::optional<FieldForces>& forces, const std::filesystem::path& folder,

@@ -72,7 +72,7 @@ std::vector<DarknessRecord> write_darkness_maps(const sensors::DarknessModel& mo
     records.push_back(record);
     if (progress) progress("heights", std::ssize(records), std::ssize(frames));
   }
-  faults_of(records);
+  faults_of(records);  // an error where there is nothing to write
   write_whole_file(folder / "heights.csv", csv_of(records));
   return records;
 }

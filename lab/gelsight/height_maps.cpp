@@ -73,7 +73,7 @@ std::vector<HeightRecord> write_height_maps(const sensors::HeightModel& model, c
     records.push_back(record);
     if (progress) progress("heights", std::ssize(records), std::ssize(frames));
   }
-  faults_of(records);
+  faults_of(records);  // an error where there is nothing to write
   write_whole_file(folder / "heights.csv", csv_of(records));
   return records;
 }
