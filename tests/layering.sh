@@ -22,7 +22,7 @@ render/sampling: core
 render/materials: core render/spectra render/sampling
 render/scene: core render/spectra render/sampling render/materials
 render/lamps: core render/spectra render/sampling render/materials render/scene
-render/cameras: core render/sampling render/materials render/scene
+render/cameras: core render/spectra render/sampling render/materials render/scene
 render/paths: core render/spectra render/sampling render/materials render/scene render/lamps render/cameras
 render/direct: core render/spectra render/sampling render/materials render/scene render/lamps render/cameras render/paths
 render/membrane: core render/sampling render/materials render/scene render/lamps render/cameras render/paths
@@ -49,7 +49,7 @@ sim/plan: core fem/contact fem/fine_relief fem/vibration sim/files sim/scene
 sim/press: core fem/mesh fem/elements fem/shapes fem/contact fem/finite_strain fem/error fem/vibration sim/files sim/scene sim/plan
 sim/view: core fem/mesh fem/elements fem/shapes fem/contact fem/fine_relief render/scene render/cameras render/paths sim/files sim/scene sim/plan
 sim/sensor: core fem/elements fem/shapes fem/contact fem/error fem/fine_relief fem/vibration render/spectra render/scene render/cameras render/paths render/direct render/membrane render/imager render/events sim/files sim/scene sim/plan sim/press sim/view
-sim/need: core fem/mesh fem/elements fem/contact fem/finite_strain render/paths render/imager sim/scene sim/plan sim/press sim/view
+sim/need: core fem/mesh fem/elements fem/contact fem/finite_strain render/paths render/imager sim/scene sim/plan sim/press sim/view sim/sensor
 sim/cost: core fem/mesh fem/elements fem/shapes fem/contact fem/finite_strain fem/error render/cameras render/paths render/imager sim/files sim/scene sim/plan sim/press sim/view sim/sensor
 sim/grasp: core fem/mesh fem/elements fem/contact fem/error fem/fine_relief fem/vibration sim/scene sim/press
 datasets/jobs: core render/lamps sim/relief sim/scene sim/plan sim/press sim/sensor sim/need

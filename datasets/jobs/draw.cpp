@@ -101,6 +101,7 @@ void fields(YamlReader& in, DrawnEffects& effects) {
   in.optional("elasticity", effects.elasticity);
   in.optional("fine_relief", effects.fine_relief);
   in.optional("interreflection", effects.interreflection);
+  in.optional("diffraction", effects.diffraction);
 }
 
 void fields(YamlReader& in, DrawJob& job) {

@@ -86,6 +86,7 @@ struct DrawnEffects {
   sim::Elasticity elasticity = sim::Elasticity::automatic;
   sim::Switch fine_relief = sim::Switch::automatic;
   sim::Switch interreflection = sim::Switch::automatic;
+  sim::Switch diffraction = sim::Switch::automatic;
 };
 
 /// A job file of drawn samples, as read and checked.

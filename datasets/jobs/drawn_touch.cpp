@@ -119,6 +119,7 @@ PreparedDraw prepare_draw(const std::filesystem::path& file) {
   prepared.effects.elasticity = job.effects.elasticity;
   prepared.effects.fine_relief = job.effects.fine_relief;
   prepared.effects.interreflection = job.effects.interreflection;
+  prepared.effects.diffraction = job.effects.diffraction;
   prepared.blocks = blocks_of(job);
   if (job.splits.by == SplitBy::unit) {
     prepared.unit_splits = splits_of_units(job.splits, job.seed, job.draw.units.count);

@@ -12,7 +12,8 @@ namespace {
 /// be of another kind.
 constexpr sim::SwitchedEffect kSwitched[] = {
     {"fine relief", &sim::EffectSwitches::fine_relief, &sim::Plan::fine_relief},
-    {"interreflection", &sim::EffectSwitches::interreflection, &sim::Plan::interreflection}};
+    {"interreflection", &sim::EffectSwitches::interreflection, &sim::Plan::interreflection},
+    {"diffraction", &sim::EffectSwitches::diffraction, &sim::Plan::diffraction}};
 
 std::string key_of(const PreparedDraw& prepared, const PlannedDraw& one) {
   std::string key = fmt::format("draw, sample {}\n{}\n", one.sample, prepared.text);

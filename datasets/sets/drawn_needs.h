@@ -25,7 +25,7 @@ struct NeededDraw {
 std::vector<NeededDraw> plan_by_need(PreparedDraw& prepared, const std::filesystem::path& cache,
                                      const Progress& progress = {});
 
-/// As "finite strain on, fine relief on, interreflection off": what plan_by_need() has switched.
+/// As "finite strain on, fine relief on, interreflection off, diffraction off": what plan_by_need() has switched.
 std::string in_words(const sim::EffectSwitches& effects);
 
 }  // namespace touchstone::datasets

@@ -16,6 +16,7 @@ constexpr sim::SwitchedEffect kSwitches[] = {
     {"fine relief", &sim::EffectSwitches::fine_relief, &sim::Plan::fine_relief},
     {"stress relaxation", &sim::EffectSwitches::relaxation, &sim::Plan::relaxation},
     {"interreflection", &sim::EffectSwitches::interreflection, &sim::Plan::interreflection},
+    {"diffraction", &sim::EffectSwitches::diffraction, &sim::Plan::diffraction},
     {"direct light", &sim::EffectSwitches::direct_light, &sim::Plan::direct_light},
     {"shared paths", &sim::EffectSwitches::shared_paths, &sim::Plan::shared_paths},
     {"motion blur", &sim::EffectSwitches::motion_blur, &sim::Plan::motion_blur},

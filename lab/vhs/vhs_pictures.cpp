@@ -121,62 +121,6 @@ double transfer_at(const sim::DeviceSpec& device, const VhsView& view, const Eig
   return sum / count;
 }
 
-cv::Mat spread_by_diffraction(const cv::Mat& sharp, const PinholeOptics& optics,
-                              const render::Spectrum& wavelengths_nm) {
-  constexpr int kMargin_px = 32;  // so that a discrete transform's ends don't meet
-  constexpr int kTable = 1024;
-  TS_ASSERT(sharp.depth() == CV_32F && sharp.channels() == wavelengths_nm.size());
-  const double pitch = optics.pixel_mm;
-  PinholeOptics hole = optics;
-  hole.pixel_mm = 0.0;                            // the picture's pixels have their size already
-  const double fastest = std::sqrt(0.5) / pitch;  // waves a mm of the sensor, along a diagonal
-  std::vector<cv::Mat> bands;
-  cv::split(sharp, bands);
-  for (std::size_t band = 0; band < bands.size(); ++band) {
-    cv::Mat wide;
-    cv::copyMakeBorder(bands[band], wide, kMargin_px, kMargin_px, kMargin_px, kMargin_px, cv::BORDER_REFLECT);
-    cv::Mat waves;
-    cv::dft(wide, waves, cv::DFT_COMPLEX_OUTPUT);
-    std::vector<double> table;
-    for (int k = 0; k <= kTable + 1; ++k) {
-      const double on_object = fastest * k / kTable * optics.to_sensor_mm / optics.to_object_mm;
-      table.push_back(transfer_with_diffraction(hole, on_object, wavelengths_nm[static_cast<Eigen::Index>(band)]));
-    }
-    for (int row = 0; row < waves.rows; ++row) {
-      const double y = static_cast<double>(std::min(row, waves.rows - row)) / waves.rows / pitch;
-      for (int column = 0; column < waves.cols; ++column) {
-        const double x = static_cast<double>(std::min(column, waves.cols - column)) / waves.cols / pitch;
-        const double place = std::hypot(x, y) / fastest * kTable;
-        const auto low = std::min(static_cast<std::size_t>(place), static_cast<std::size_t>(kTable));
-        const double part = place - static_cast<double>(low);
-        waves.at<cv::Vec2f>(row, column) *= static_cast<float>((1.0 - part) * table[low] + part * table[low + 1]);
-      }
-    }
-    cv::Mat spread;
-    cv::dft(waves, spread, cv::DFT_INVERSE | cv::DFT_REAL_OUTPUT | cv::DFT_SCALE);
-    bands[band] = cv::max(spread(cv::Rect({kMargin_px, kMargin_px}, bands[band].size())), 0.0);
-  }
-  cv::Mat out;
-  cv::merge(bands, out);
-  return out;
-}
-
-VhsPicture diffracted_picture(const sim::SceneSpec& scene, int paths, const std::filesystem::path& cache,
-                              const Progress& progress) {
-  constexpr double kNarrower = 0.1;
-  sim::SceneSpec sharp = scene;
-  auto& pinhole = std::get<sim::PinholeSpec>(sharp.device.camera->optics);
-  pinhole.hole_diameter_um *= kNarrower;
-  pinhole.foil_thickness_um *= kNarrower;
-  VhsPicture picture = vhs_picture(sharp, paths, cache, progress);
-  picture.irradiance *= 1.0 / (kNarrower * kNarrower);
-  const sim::Plan plan = sim::make_plan(scene);
-  picture.irradiance = spread_by_diffraction(picture.irradiance, optics_of(scene.device), plan.bands.centres_nm);
-  const render::Imager imager = sim::imager(scene.device, plan.bands, true);
-  picture.frame = render::develop(render::expose(picture.irradiance, imager, scene.seed, 0), imager);
-  return picture;
-}
-
 PinholeOptics optics_of(const sim::DeviceSpec& device) {
   const sim::CameraSpec& camera = *device.camera;
   const auto& pinhole = std::get<sim::PinholeSpec>(camera.optics);

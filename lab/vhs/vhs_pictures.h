@@ -46,17 +46,6 @@ class VhsView {
   double z_mm_;
 };
 
-/// A picture through a point of a hole as the hole's diffraction spreads it, band by band, near the axis: each wave of
-/// it keeps the part that transfer_with_diffraction says. CV_32FC(bands); never below 0. @pre a wavelength a band
-cv::Mat spread_by_diffraction(const cv::Mat& sharp, const PinholeOptics& optics,
-                              const render::Spectrum& wavelengths_nm);
-
-/// The last frame with diffraction: rendered through a hole a tenth as wide (100 times the light), spread by the real
-/// one's diffraction, then exposed.
-/// `irradiance` is that before exposure.
-VhsPicture diffracted_picture(const sim::SceneSpec& scene, int paths, const std::filesystem::path& cache,
-                              const Progress& progress);
-
 /// The device's pinhole as closed forms take it, for a face at the gel's outer surface. @pre the device has a pinhole
 PinholeOptics optics_of(const sim::DeviceSpec& device);
 

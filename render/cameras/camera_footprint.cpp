@@ -4,7 +4,6 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "core/error.h"
@@ -16,6 +15,8 @@ namespace {
 constexpr int kHoleSide = 16;
 constexpr int kWideHoleSide = 24;
 constexpr double kWide = 8.0;  // pixels
+constexpr int kLensSide = 6;   // the same of a lens where diffraction spreads each of them
+constexpr int kFarCells = 4;   // far from the middle diffraction's cells are so many times as wide
 
 /// Places in the picture whose central rays meet the surface where the rays through all of the hole do, relative to
 /// the pixel, and what each weighs (in all 1).
@@ -31,6 +32,76 @@ std::optional<Eigen::Vector2d> place_at(const std::optional<LayerRay>& ray, doub
   if (!ray || ray->direction.z() == 0.0) return std::nullopt;
   const Eigen::Vector3d at = ray->origin + (z - ray->origin.z()) / ray->direction.z() * ray->direction;
   return Eigen::Vector2d(at.x(), at.y());
+}
+
+/// The sensor about a point in cells: where they are from it (mm), and how large.
+struct Cell {
+  Eigen::Vector2d away;
+  double area;
+};
+
+/// As fine as pixels and diffraction's rings ask for where most of the light is, coarser beyond.
+std::vector<Cell> cells_of(const DiffractionSpread& spread, double pitch_mm) {
+  const double fine = std::min(pitch_mm, spread.ring_mm() / 2.0);
+  const double coarse = kFarCells * fine;
+  const auto half = static_cast<int>(std::ceil(spread.reach_mm() / coarse));
+  std::vector<Cell> cells;
+  for (int j = -half; j <= half; ++j) {
+    for (int i = -half; i <= half; ++i) {
+      const Eigen::Vector2d middle(i * coarse, j * coarse);
+      if (middle.norm() > spread.reach_mm()) continue;
+      if (middle.norm() > spread.core_mm()) {
+        cells.push_back({middle, coarse * coarse});
+        continue;
+      }
+      for (int l = 0; l < kFarCells; ++l) {
+        for (int k = 0; k < kFarCells; ++k) {
+          const Eigen::Vector2d part(k + 0.5 - 0.5 * kFarCells, l + 0.5 - 0.5 * kFarCells);
+          cells.push_back({middle + fine * part, fine * fine});
+        }
+      }
+    }
+  }
+  return cells;
+}
+
+/// Diffraction in place of what a hole's places do, or beside what a lens's do. Variances stay the geometric ones.
+void diffract(const ReadyCamera& camera, const DiffractionSpread& diffraction, const std::vector<Cell>& cells,
+              std::optional<int> band, const Eigen::Vector2d& pixel, Spread& spread) {
+  const Eigen::Vector2d at =
+      std::visit([&](const auto& one) { return from_axis_mm(one, pixel.x(), pixel.y()); }, camera);
+  std::vector<Eigen::Vector2d> offsets;
+  std::vector<double> weights;
+  double whole = 0.0;
+  for (const Cell& cell : cells) {
+    double density = 0.0;
+    for (int k = band.value_or(0); k < (band ? *band + 1 : diffraction.bands()); ++k) {
+      density += diffraction.density(k, at, cell.away);
+    }
+    if (density == 0.0) continue;
+    const Eigen::Vector2d from =
+        std::visit([&](const auto& one) { return image_point_at(one, at + cell.away); }, camera);
+    offsets.emplace_back(from - pixel);
+    weights.push_back(density * cell.area);
+    whole += weights.back();
+  }
+  for (double& weight : weights) weight /= whole;
+  if (std::holds_alternative<PreparedLens>(camera)) {
+    std::vector<Eigen::Vector2d> all_offsets;
+    std::vector<double> all_weights;
+    for (std::size_t k = 0; k < spread.offsets.size(); ++k) {
+      for (std::size_t c = 0; c < offsets.size(); ++c) {
+        all_offsets.emplace_back(spread.offsets[k] + offsets[c]);
+        all_weights.push_back(spread.weights[k] * weights[c]);
+      }
+    }
+    offsets = std::move(all_offsets);
+    weights = std::move(all_weights);
+  } else {
+    spread.mean.setZero();
+  }
+  spread.offsets = std::move(offsets);
+  spread.weights = std::move(weights);
 }
 
 Spread spread_at(const Scene& fixture, const ReadyCamera& camera, int layer, const Eigen::Vector2d& pixel, double z,
@@ -118,24 +189,27 @@ double scale_to_keep_variance(const Spread& spread, int axis, int side) {
 
 CameraFootprint::Kernel kernel_of(const Spread& spread, const Eigen::Vector2d& scale, int phase_x, int phase_y,
                                   int side) {
-  std::vector<std::array<double, 3>> found;  // row, column, weight
+  const auto offset_of = [&](std::size_t k) -> Eigen::Vector2d {
+    return spread.mean + scale.cwiseProduct(spread.offsets[k] - spread.mean);
+  };
+  int reach = 0;  // squares
   for (std::size_t k = 0; k < spread.offsets.size(); ++k) {
-    const Eigen::Vector2d offset = spread.mean + scale.cwiseProduct(spread.offsets[k] - spread.mean);
+    reach = std::max(reach, static_cast<int>(std::ceil(offset_of(k).cwiseAbs().maxCoeff() / side)) + 2);
+  }
+  Eigen::ArrayXXd found = Eigen::ArrayXXd::Zero(2 * reach + 1, 2 * reach + 1);  // by column, row
+  for (std::size_t k = 0; k < spread.offsets.size(); ++k) {
+    const Eigen::Vector2d offset = offset_of(k);
     shares(phase_x + 0.5 + offset.x(), side, [&](int column, double across) {
-      shares(phase_y + 0.5 + offset.y(), side, [&](int row, double down) {
-        found.push_back({static_cast<double>(row), static_cast<double>(column), spread.weights[k] * across * down});
-      });
+      shares(phase_y + 0.5 + offset.y(), side,
+             [&](int row, double down) { found(column + reach, row + reach) += spread.weights[k] * across * down; });
     });
   }
-  std::stable_sort(found.begin(), found.end(),
-                   [](const auto& a, const auto& b) { return a[0] != b[0] ? a[0] < b[0] : a[1] < b[1]; });
   CameraFootprint::Kernel kernel;
-  double weight = 0.0;
-  for (std::size_t k = 0; k < found.size(); ++k) {
-    weight += found[k][2];
-    if (k + 1 < found.size() && found[k + 1][0] == found[k][0] && found[k + 1][1] == found[k][1]) continue;
-    kernel.taps.push_back({static_cast<int>(found[k][1]), static_cast<int>(found[k][0]), static_cast<float>(weight)});
-    weight = 0.0;
+  for (int row = -reach; row <= reach; ++row) {
+    for (int column = -reach; column <= reach; ++column) {
+      const double weight = found(column + reach, row + reach);
+      if (weight != 0.0) kernel.taps.push_back({column, row, static_cast<float>(weight)});
+    }
   }
   return kernel;
 }
@@ -155,8 +229,11 @@ std::vector<Eigen::Vector2d> footprint_blocks(const ReadyCamera& camera, int blo
 }
 
 CameraFootprint make_footprint(const Scene& fixture, const ReadyCamera& camera, int layer,
-                               const std::vector<double>& surface_z, int block, double rays_across, int most_spacing) {
+                               const std::vector<double>& surface_z, int block, double rays_across, int most_spacing,
+                               std::optional<int> band) {
   const std::vector<Eigen::Vector2d> middles = footprint_blocks(camera, block);
+  const DiffractionSpread* diffraction = std::visit([](const auto& one) { return one.diffraction.get(); }, camera);
+  const bool is_lens = std::holds_alternative<PreparedLens>(camera);
   TS_ASSERT(surface_z.size() == middles.size());
   std::vector<Spread> spreads(middles.size());
   const auto spread_all = [&](int hole_side) {
@@ -170,9 +247,11 @@ CameraFootprint make_footprint(const Scene& fixture, const ReadyCamera& camera, 
     for (const Spread& spread : spreads) least = std::min(least, 4.0 * std::sqrt(spread.variance.minCoeff()));
     return least;
   };
-  spread_all(kHoleSide);
+  spread_all(diffraction != nullptr && is_lens ? kLensSide : kHoleSide);
   if (least_width() > kWide) spread_all(kWideHoleSide);
   const double narrowest = least_width();
+  // What diffraction makes of a hole's disc is narrower than that in its middle.
+  if (diffraction != nullptr && !is_lens) most_spacing = 1;
   CameraFootprint made;
   made.block = block;
   made.narrowest = narrowest;
@@ -184,10 +263,19 @@ CameraFootprint make_footprint(const Scene& fixture, const ReadyCamera& camera, 
   made.blocks_across = (size.x() + block - 1) / block;
   const int side = made.spacing;
   const int phases = side * side;
+  if (diffraction != nullptr) {
+    const double pitch_mm = std::visit([](const auto& one) { return 1e-3 * one.pixel_pitch_um; }, camera);
+    const std::vector<Cell> cells = cells_of(*diffraction, pitch_mm);
+    tbb::parallel_for(std::size_t{0}, middles.size(),
+                      [&](std::size_t k) { diffract(camera, *diffraction, cells, band, middles[k], spreads[k]); });
+  }
   made.kernels.resize(spreads.size() * phases);
   tbb::parallel_for(std::size_t{0}, spreads.size(), [&](std::size_t k) {
     const Spread& spread = spreads[k];
-    const Eigen::Vector2d scale(scale_to_keep_variance(spread, 0, side), scale_to_keep_variance(spread, 1, side));
+    Eigen::Vector2d scale = Eigen::Vector2d::Ones();
+    if (diffraction == nullptr) {
+      scale = {scale_to_keep_variance(spread, 0, side), scale_to_keep_variance(spread, 1, side)};
+    }
     for (int phase = 0; phase < phases; ++phase) {
       made.kernels[k * phases + phase] = kernel_of(spread, scale, phase % side, phase / side, side);
     }

@@ -55,10 +55,10 @@ struct CameraFootprint {
 
 /// The footprint of a camera on `surface_z`, the height of what it looks at, by block of the grid of `block` pixels;
 /// with `rays_across` central rays along the narrowest footprint at least, or one a pixel, and `most_spacing` pixels
-/// from one to the next at most.
+/// from one to the next at most. Of a camera with diffraction that of one band, or the mean over all.
 CameraFootprint make_footprint(const Scene& fixture, const ReadyCamera& camera, int layer,
                                const std::vector<double>& surface_z, int block, double rays_across,
-                               int most_spacing = 8);
+                               int most_spacing = 8, std::optional<int> band = {});
 
 /// The blocks that make_footprint works on, their middles (pixels).
 std::vector<Eigen::Vector2d> footprint_blocks(const ReadyCamera& camera, int block);

@@ -143,6 +143,8 @@ CameraRays trace_to_layer(const Scene& fixture, const ReadyCamera& camera, const
   if (!dark) rays.veil.assign(packet_count * kPacket * bands, 0.0f);
   const RigidTransform& camera_place = pose_of(camera);
   const double camera_index = index_at(fixture, camera_place);
+  const DiffractionSpread* diffraction = std::visit([](const auto& one) { return one.diffraction.get(); }, camera);
+  const bool is_lens = std::holds_alternative<PreparedLens>(camera);
 
   tbb::parallel_for(0, rays.tiles, [&](int tile) {
     const int left = tile % rays.tiles_across * CameraRays::kSide;
@@ -164,9 +166,23 @@ CameraRays trace_to_layer(const Scene& fixture, const ReadyCamera& camera, const
             static_cast<std::uint64_t>(row) * static_cast<std::uint64_t>(grid.columns) + std::uint64_t(column);
         SampleSequence numbers = samples == 1 ? SampleSequence::centre() : SampleSequence(seed, pixel, sample);
         const auto [px, py] = numbers.next_pair();
-        const auto [hu, hv] = numbers.next_pair();
-        const auto ray = ray_near(camera, grid.left + grid.spacing * column + (px - 0.5),
-                                  grid.top + grid.spacing * row + (py - 0.5), hu, hv);
+        auto [hu, hv] = numbers.next_pair();
+        Eigen::Vector2d from(grid.left + grid.spacing * column + (px - 0.5),
+                             grid.top + grid.spacing * row + (py - 0.5));
+        Spectrum spread = flat_spectrum(rays.bands, 1.0);
+        if (samples > 1 && diffraction != nullptr) {
+          // A hole's light all comes through its centre then.
+          const auto [u, v] = is_lens ? numbers.next_pair() : std::array<double, 2>{hu, hv};
+          if (!is_lens) hu = hv = 0.5;
+          const DiffractionSpread::Draw draw = diffraction->draw(u, v);
+          const Eigen::Vector2d at =
+              std::visit([&](const auto& one) { return from_axis_mm(one, from.x(), from.y()); }, camera);
+          for (int band = 0; band < rays.bands; ++band) {
+            spread[band] = diffraction->density(band, at, draw.away) / draw.density;
+          }
+          from = std::visit([&](const auto& one) { return image_point_at(one, at + draw.away); }, camera);
+        }
+        const auto ray = ray_near(camera, from.x(), from.y(), hu, hv);
         if (!ray) continue;
         const Followed end = follow(fixture, camera_place * ray->origin, camera_place.turn(ray->direction), layer);
         const double weight = ray->weight * camera_index * camera_index / samples;
@@ -174,10 +190,10 @@ CameraRays trace_to_layer(const Scene& fixture, const ReadyCamera& camera, const
         for (std::size_t band = 0; band < bands; ++band) {
           const double beyond = end.arrives ? 0.0 : end.transmittance[band];
           if (!dark) {
-            rays.veil[slot + band] =
-                static_cast<float>(weight * fixture.environment[band] * (end.reflectance[band] + beyond));
+            rays.veil[slot + band] = static_cast<float>(weight * spread[band] * fixture.environment[band] *
+                                                        (end.reflectance[band] + beyond));
           }
-          rays.through[slot + band] = static_cast<float>(weight * end.transmittance[band]);
+          rays.through[slot + band] = static_cast<float>(weight * spread[band] * end.transmittance[band]);
         }
         if (!end.arrives) continue;
         packet.valid[lane] = -1;

@@ -215,6 +215,14 @@ CameraRay lens_ray(const PreparedLens& camera, double x, double y, double u, dou
   return ray;
 }
 
+Eigen::Vector2d from_axis_mm(const PreparedLens& camera, double x, double y) {
+  return camera.sensor_distance * tangents_of(camera.matrix, x, y);
+}
+
+Eigen::Vector2d image_point_at(const PreparedLens& camera, const Eigen::Vector2d& from_axis_mm) {
+  return pixel_of(camera.matrix, from_axis_mm / camera.sensor_distance);
+}
+
 std::optional<Eigen::Vector3d> view_direction(const PreparedLens& camera, double x, double y) {
   const auto seen = undistort(camera.distortion, camera.reach, tangents_of(camera.matrix, x, y));
   if (!seen) return std::nullopt;

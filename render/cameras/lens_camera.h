@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <variant>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "core/monotone_curve.h"
 #include "core/transform.h"
 #include "render/cameras/camera_ray.h"
+#include "render/cameras/diffraction_spread.h"
 #include "render/cameras/lens_distortion.h"
 
 namespace touchstone::render {
@@ -46,6 +48,8 @@ struct LensCamera {
   double focus_distance_mm = std::numeric_limits<double>::infinity();  ///< from the lens to what is sharp
   std::optional<Vignetting> vignetting;                                ///< absent: none
   RigidTransform gel_from_camera;
+  /// At the stop, beside the geometric blur; null: none. As a pinhole's.
+  std::shared_ptr<const DiffractionSpread> diffraction;
 };
 
 /// The matrix of a lens of the given focal length focused at the given distance (may be infinite), its axis through the
@@ -84,6 +88,11 @@ PreparedLens prepare(const LensCamera& camera);
 /// `v`) in [0,1)^2, (1/2, 1/2) being its centre. The mean of `weight` over u, v is the irradiance per radiance.
 /// @throws Error if the distortion can't be inverted there
 CameraRay lens_ray(const PreparedLens& camera, double x, double y, double u, double v);
+
+/// From the principal point to an image point, mm on the sensor, along the picture's axes.
+Eigen::Vector2d from_axis_mm(const PreparedLens& camera, double x, double y);
+/// The inverse.
+Eigen::Vector2d image_point_at(const PreparedLens& camera, const Eigen::Vector2d& from_axis_mm);
 
 /// The unit vector of the camera frame along which an image point looks through the lens's centre; nullopt where the
 /// distortion can't be inverted: nowhere in a checked camera's picture, and beside it from some distance on.

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "render/cameras/sampled_ray.h"
 #include "render/paths/path_integrator.h"
 
 namespace touchstone::render {
@@ -115,15 +116,15 @@ ProbedRim<N> probe_rim(const PathIntegrator<N>& prober, const AnyCamera& camera,
   for (std::uint32_t probe = 0; probe < probes; ++probe) {
     SampleSequence numbers(seed ^ kOtherNumbers, number, probe);
     const auto [px, py] = numbers.next_pair();
-    const auto [hu, hv] = numbers.next_pair();
     const double x = std::clamp(column - 1.0 + 3.0 * px, 0.0, static_cast<double>(camera.width));
     const double y = std::clamp(row - 1.0 + 3.0 * py, 0.0, static_cast<double>(camera.height));
-    const auto ray = camera_ray(camera, x, y, hu, hv);
-    if (!ray) continue;
+    const auto sample = sampled_ray<N>(camera, x, y, numbers);
+    if (!sample) continue;
+    const CameraRay& ray = sample->ray;
     RayCounts own;
     const Bands<N> basic =
-        prober.trace(camera.gel_from_camera * ray->origin, camera.gel_from_camera.turn(ray->direction), numbers, own);
-    const Bands<N> value = basic * (ray->weight * camera_index * camera_index);
+        prober.trace(camera.gel_from_camera * ray.origin, camera.gel_from_camera.turn(ray.direction), numbers, own);
+    const Bands<N> value = basic * sample->bands * (ray.weight * camera_index * camera_index);
     rim.light = rim.light || own.direct_lit > 0;
     rim.shadow = rim.shadow || own.direct_lit < own.direct;
     if (own.direct_lit > 0 && value.sum() > rim.brightest.sum()) rim.brightest = value;
@@ -156,6 +157,8 @@ PixelResult<N> sample_pixel(const PathIntegrator<N>& integrator, const PathInteg
   ErrorEstimate total;
   ErrorEstimate electrons;
   Bands<N> sum = Bands<N>::Zero();
+  Bands<N> evenly = Bands<N>::Zero();   // the same without the bands' own weights
+  Bands<N> weights = Bands<N>::Zero();  // the sum of those
   Bands<N> electrons_per_irradiance = Bands<N>::Zero();
   if (settings.noise) electrons_per_irradiance = settings.noise->electrons_per_irradiance;
   const std::uint64_t number =
@@ -173,18 +176,26 @@ PixelResult<N> sample_pixel(const PathIntegrator<N>& integrator, const PathInteg
     for (; pixel.samples < target; ++pixel.samples) {
       SampleSequence numbers(settings.seed, number, static_cast<std::uint32_t>(pixel.samples));
       const auto [px, py] = numbers.next_pair();
-      const auto [hu, hv] = numbers.next_pair();
       ++counts.paths;
       Bands<N> value = Bands<N>::Zero();
-      if (const auto ray = camera_ray(camera, column + px, row + py, hu, hv)) {
+      Bands<N> seen = value;
+      Bands<N> own = Bands<N>::Ones();
+      if (const auto sample = sampled_ray<N>(camera, column + px, row + py, numbers)) {
+        const CameraRay& ray = sample->ray;
         const Bands<N> basic =
-            integrator.trace(gel_from_camera * ray->origin, gel_from_camera.turn(ray->direction), numbers, counts);
-        value = basic * (ray->weight * camera_index * camera_index);
+            integrator.trace(gel_from_camera * ray.origin, gel_from_camera.turn(ray.direction), numbers, counts);
+        const Bands<N> light = basic * (ray.weight * camera_index * camera_index);
+        own = sample->bands;
+        value = light * own;
+        // Diffraction's weights are 1 on the mean: what they make of evenly lit surroundings is no error.
+        seen = pixel.samples > 0 ? Bands<N>(value - (own - 1.0) * (evenly / pixel.samples)) : value;
+        evenly += light;
       }
+      weights += own;
       sum += value;
       if (value.sum() > brightest.sum()) brightest = value;
-      total.add(value.sum());
-      if (settings.noise) electrons.add((value * electrons_per_irradiance).sum());
+      total.add(seen.sum());
+      if (settings.noise) electrons.add((seen * electrons_per_irradiance).sum());
     }
     if (!settings.noise || pixel.samples >= settings.max_samples) break;
     direct += counts.direct - before.direct;
@@ -213,7 +224,9 @@ PixelResult<N> sample_pixel(const PathIntegrator<N>& integrator, const PathInteg
     }
     target = next_turn(pixel.samples, settings.min_samples, settings.max_samples);
   }
-  pixel.irradiance = sum / static_cast<double>(pixel.samples);
+  // The weighted mean: off by less than the weights' own scatter over the samples, and never below zero. Without
+  // diffraction it is the plain one.
+  pixel.irradiance = (weights > 0.0).select(sum / weights, 0.0);
   pixel.standard_error = std::max(total.standard_error(), kShareMissed / pixel.samples * at_stake.sum());
   return pixel;
 }

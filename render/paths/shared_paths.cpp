@@ -72,22 +72,28 @@ SharedPaths::SharedPaths(std::span<const Scene> examples, const PinholeCamera& c
   }
   if (!range.known()) range = {0.0, 0.0};
   const double distance = std::abs(camera.gel_from_camera.translation.z() - 0.5 * (range.low + range.high));
+  const bool diffracts = camera.diffraction != nullptr;
   const int steps =
-      std::clamp(static_cast<int>(std::ceil((range.high - range.low) / std::max(1e-6, kHeightStep * distance))), 0,
-                 kMostHeights - 1);
+      diffracts
+          ? 0
+          : std::clamp(static_cast<int>(std::ceil((range.high - range.low) / std::max(1e-6, kHeightStep * distance))),
+                       0, kMostHeights - 1);
   int layer = 0;
   for (const FlatFace& face : examples.front().faces) layer += face.z < range.low ? 1 : 0;
   const std::size_t blocks = footprint_blocks(camera, kBlock).size();
   // From the camera's far end on, where the footprint is narrowest.
   int margin = 0;
-  for (int i = 0; i <= steps; ++i) {
-    const double height = range.high + (range.low - range.high) * i / std::max(1, steps);
-    heights_.push_back(height);
+  const auto add_footprint = [&](double height, std::optional<int> band) {
     footprints_.push_back(make_footprint(examples.front(), camera, layer, std::vector<double>(blocks, height), kBlock,
                                          std::sqrt(4.0 / std::numbers::pi * settings.max_samples),
-                                         i == 0 ? kMostSpacing : footprints_.front().spacing));
+                                         footprints_.empty() ? kMostSpacing : footprints_.front().spacing, band));
     margin = std::max(margin, footprints_.back().margin);
+  };
+  for (int i = 0; i <= steps; ++i) {
+    heights_.push_back(range.high + (range.low - range.high) * i / std::max(1, steps));
+    if (!diffracts) add_footprint(heights_.back(), {});
   }
+  for (int band = 0; diffracts && band < camera.diffraction->bands(); ++band) add_footprint(heights_.front(), band);
   for (CameraFootprint& footprint : footprints_) footprint.widen(margin);
   weight_ = cv::Mat::zeros(camera.height, camera.width, CV_32FC1);
   const CameraFootprint& footprint = footprints_[footprints_.size() / 2];
@@ -99,7 +105,21 @@ SharedPaths::SharedPaths(std::span<const Scene> examples, const PinholeCamera& c
       }
     }
   }
-  if (settings.noise) paths_ = paths_called_for(examples.back(), settings);
+  if (!settings.noise) return;
+  if (!diffracts) {
+    paths_ = paths_called_for(examples.back(), settings);
+    return;
+  }
+  // The scatter within so wide a footprint is what is seen, not noise: the hole's disc tells how many paths it takes,
+  // and what is left of their noise is in proportion to the sum of squared weights.
+  PinholeCamera plain = camera;
+  plain.diffraction.reset();
+  const SharedPaths geometric(examples, plain, settings);
+  const int row = camera.height / 2;
+  const int column = camera.width / 2;
+  const double times = footprints_[footprints_.size() / 2].sum_of_squares(row, column) /
+                       geometric.footprints_[geometric.footprints_.size() / 2].sum_of_squares(row, column);
+  paths_ = std::clamp(static_cast<int>(std::ceil(geometric.paths_ * times)), 1, kMostPaths);
 }
 
 /// Noise of neighbours that share it isn't averaged away over them.
@@ -129,8 +149,8 @@ int SharedPaths::paths_called_for(const Scene& example, const RenderSettings& se
 /// By block: the footprint of the height in the middle of what lies in it or as far beside it as points are spread.
 std::vector<std::size_t> SharedPaths::footprints_of_blocks(const Scene& scene) const {
   const CameraFootprint& any = footprints_.front();
-  std::vector<std::size_t> chosen(any.gain.size(), footprints_.size() / 2);
-  if (footprints_.size() < 2) return chosen;
+  std::vector<std::size_t> chosen(any.gain.size(), heights_.size() / 2);
+  if (heights_.size() < 2) return chosen;
   const CoarseHits seen(scene, camera_);
   const int reach = any.margin * any.spacing;
   const double step = (heights_.back() - heights_.front()) / static_cast<double>(heights_.size() - 1);
@@ -234,8 +254,11 @@ RenderedImage SharedPaths::render(const Scene& scene, const Tracer& tracer, cons
       for (int phase = left; phase < std::min(left + side, right); ++phase) {
         const int pixels = (right - phase + side - 1) / side;
         for (int plane = 0; plane < planes; ++plane) {
-          footprint.spread(by_plane.data() + plane * count, row, phase, pixels,
-                           line.data() + static_cast<std::size_t>(plane) * kBlock);
+          // The sum over the bands is spread as the middle one is.
+          const int band = plane < bands ? plane : bands / 2;
+          const CameraFootprint& own = camera_.diffraction ? footprints_[static_cast<std::size_t>(band)] : footprint;
+          own.spread(by_plane.data() + plane * count, row, phase, pixels,
+                     line.data() + static_cast<std::size_t>(plane) * kBlock);
         }
         const float share = with_error ? footprint.sum_of_squares(row, phase) : 0.0f;
         for (int k = 0; k < pixels; ++k) {

@@ -15,6 +15,9 @@ namespace touchstone::render {
 /// a pixel's mean has hundreds of paths for the price of one. Footprints are kept for some heights; each block of
 /// pixels takes that in the middle of what lies in it and beside it.
 ///
+/// With diffraction the footprint is what the hole spreads, each band's own; of the camera's object alone, at whatever
+/// height. Its stated error then has what is seen within the footprint in it.
+///
 /// What is biased: what is dz from its block's height is blurred by dz / distance too little or too much, and all of
 /// the hole sees it behind what hides it from the hole's centre (parallax of the hole's radius: some micrometres a
 /// millimetre). Noise is shared, too: it is alike in neighbouring pixels, and alike from frame to frame where nothing
@@ -47,8 +50,8 @@ class SharedPaths {
 
   PinholeCamera camera_;
   int paths_ = 1;
-  std::vector<double> heights_;              // of the footprints, mm, falling
-  std::vector<CameraFootprint> footprints_;  // on one grid
+  std::vector<double> heights_;              // of the footprints, mm, falling; with diffraction one
+  std::vector<CameraFootprint> footprints_;  // on one grid; with diffraction by band
   cv::Mat weight_;                           // CV_32FC1, W/m^2 on the sensor per radiance through the hole's centre
 };
 

@@ -45,7 +45,7 @@ class Look {
         moments_(moments),
         load_(load),
         frames_(frames),
-        camera_(camera_of(*view.scene.device.camera)),
+        camera_(planned_camera(view.scene, view.plan)),
         size_(render::size_of(camera_).x(), render::size_of(camera_).y()),
         response_(render::response_of(imager(view.scene.device, view.plan.bands, view.plan.sensor_noise))),
         deepest_(deepest(truths)),

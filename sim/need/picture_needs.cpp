@@ -12,6 +12,8 @@
 #include "sim/need/switched_effect.h"
 #include "sim/scene/device_camera.h"
 #include "sim/scene/device_imager.h"
+#include "sim/sensor/background_light.h"
+#include "sim/sensor/colour_numbers.h"
 #include "sim/view/pixel_truth.h"
 #include "sim/view/scene_view.h"
 
@@ -23,6 +25,7 @@ constexpr double kAboutContact = 0.5;  // of the contact's radius
 constexpr SwitchedEffect kSeen[] = {
     {"interreflection", &EffectSwitches::interreflection, &Plan::interreflection},
     {"fine relief", &EffectSwitches::fine_relief, &Plan::fine_relief},
+    {"diffraction", &EffectSwitches::diffraction, &Plan::diffraction},
 };
 
 /// CV_8U, 255 for so many pixels as are looked at, drawn from those that see the contact or what is about it; of a
@@ -56,15 +59,27 @@ cv::Mat looked_at(const SceneView& view, const render::Camera& camera, const fem
 /// Mean electrons of a state, from each of two sets of random numbers.
 using TwoPictures = std::array<cv::Mat, 2>;
 
-TwoPictures pictures_of(const SceneView& view, const render::Camera& camera, const fem::PressState& press,
-                        const cv::Mat& mask, int paths, const std::vector<render::ImagerResponse>& responses) {
+/// Of a device with a background with what that adds where nothing is pressed, as the sensor's own pictures: it gives
+/// back most of what an effect makes of the untouched unit, so that much less than its whole light is left to change.
+TwoPictures pictures_of(const SceneView& view, const fem::PressState& press, const cv::Mat& mask, int paths,
+                        const std::vector<render::ImagerResponse>& responses) {
+  const render::Camera camera = planned_camera(view.scene, view.plan);
   const render::Tracer tracer = view.tracer(press);
+  const cv::Mat& background = view.scene.device.background;
+  std::optional<render::Tracer> rest;
+  if (!background.empty()) rest.emplace(view.seen(at_rest(press), {}));
+  const render::Imager ideal = imager(view.scene.device, view.plan.bands, false);
   render::RenderSettings settings;
   settings.min_samples = settings.max_samples = paths;
   TwoPictures pictures;
   for (std::size_t k = 0; k < pictures.size(); ++k) {
     settings.seed = view.scene.seed + k * kOtherSeed;
-    pictures[k] = render::mean_electrons(tracer.render(camera, settings, mask).irradiance, responses);
+    cv::Mat light = tracer.render(camera, settings, mask).irradiance;
+    if (rest) {
+      const cv::Mat missing = missing_at_rest(background, rest->render(camera, settings, mask).irradiance, ideal);
+      light = with_numbers(light, missing, irradiance_per_number(ideal));
+    }
+    pictures[k] = render::mean_electrons(light, responses);
   }
   return pictures;
 }
@@ -118,7 +133,7 @@ void add_picture_needs(const SceneSpec& scene, const Plan& plan, const fem::Comp
   for (const int k : frames) {
     const fem::PressState& press = truths[static_cast<std::size_t>(k)].press;
     masks.push_back(looked_at(view, camera, press, settings.pixels));
-    planned.push_back(pictures_of(view, camera, press, masks.back(), settings.paths, responses));
+    planned.push_back(pictures_of(view, press, masks.back(), settings.paths, responses));
   }
   for (const SwitchedEffect& one : kSeen) {
     const std::optional<SwitchedScene> other = switched(scene, plan, one);
@@ -129,8 +144,7 @@ void add_picture_needs(const SceneSpec& scene, const Plan& plan, const fem::Comp
       NoiseSum sum;
       for (std::size_t k = 0; k < frames.size(); ++k) {
         const fem::PressState& press = truths[static_cast<std::size_t>(frames[k])].press;
-        sum.add(planned[k], pictures_of(turned, camera, press, masks[k], settings.paths, responses), masks[k],
-                responses);
+        sum.add(planned[k], pictures_of(turned, press, masks[k], settings.paths, responses), masks[k], responses);
       }
       need.change.emplace().pixel_noise = sum.root();
       const SceneView& fine = plan.fine_relief ? view : turned;

@@ -122,8 +122,13 @@ void plan_finite_strain(const SceneSpec& scene, Plan& plan, PlanTable& table) {
                                            : "linear elasticity is the default; where truth's largest strain is above "
                                              "some 0.2, effects.elasticity: neo_hookean is worth its time (`touchstone "
                                              "plan --linear-range` tells)";
-  const bool can = asked == Elasticity::automatic && unfit.empty();
-  plan.finite_strain = table.add_by_need(name, can ? Switch::automatic : Switch::off, false, why, cost);
+  const Switch forced = asked == Elasticity::automatic ? Switch::automatic : Switch::off;
+  plan.finite_strain = table.add_by_need(name, forced, false,
+                                         unfit.empty() ? why : fmt::format("it can't be had with {} yet", unfit), cost);
+  if (!unfit.empty()) {
+    plan.finite_strain = plan.effects.back().on = false;
+    plan.effects.back().cost = "nothing";
+  }
   const std::optional<Change>& change = plan.effects.back().change;
   if (!unfit.empty() && asked == Elasticity::automatic && change && exceeds(*change, *table.accuracy())) {
     plan.warnings.push_back(fmt::format("{} is left out, which changes {}: it can't be had with {} yet", name,
@@ -311,17 +316,17 @@ void plan_interreflection(const SceneSpec& scene, Plan& plan, PlanTable& table) 
       table.accuracy()
           ? ""
           : fmt::format("; allowed to leave out is {:.1f} %", 100 * scene.light.interreflection_tolerance));
-  // What the room sends onto a coating is light that only a bounce brings to the camera.
-  const bool lit_by_room = device.coating && device.room_radiance.largest() > 0.0;
   const std::string cost = "3 to 5 times the rays";
-  if (plan.scattering || lit_by_room) {
-    plan.interreflection = table.add(
-        "interreflection", scene.effects.interreflection, true,
-        plan.scattering ? "light is scattered many times in a milky gel" : "the room lights the coating", cost);
+  if (plan.scattering) {
+    plan.interreflection = table.add("interreflection", scene.effects.interreflection, true,
+                                     "light is scattered many times in a milky gel", cost);
     return;
   }
-  const bool much = gain > scene.light.interreflection_tolerance;
-  plan.interreflection = table.add_by_need("interreflection", scene.effects.interreflection, much, why, cost);
+  // What the room sends onto a coating is light that only a bounce brings to the camera.
+  const bool lit_by_room = device.coating && device.room_radiance.largest() > 0.0;
+  const bool much = lit_by_room || gain > scene.light.interreflection_tolerance;
+  plan.interreflection = table.add_by_need("interreflection", scene.effects.interreflection, much,
+                                           lit_by_room ? "the room lights the coating" : why, cost);
 }
 
 void plan_print(const SceneSpec& scene, Plan& plan, PlanTable& table) {
@@ -493,6 +498,7 @@ Plan make_plan(const SceneSpec& scene, const SceneNeeds& needs) {
   if (plan.camera) {
     plan_pipeline(scene, plan, table);
     plan_time(scene, plan, table);
+    plan_diffraction(scene, plan, table);
     plan_direct_light(scene, plan, table);
     plan_shared_paths(scene, plan, table);
   }

@@ -45,6 +45,7 @@ struct Plan {
   bool motion_blur = false;
   bool rolling_shutter = false;
   bool events = false;
+  bool diffraction = false;     ///< at the camera's hole or stop
   bool direct_light = false;    ///< to be tried; VirtualCamera measures whether it holds (sim/sensor/direct_light.h)
   bool shared_paths = false;    ///< behind a wide hole, where direct light isn't taken
   int states_a_frame = 1;       ///< pressed states that are kept from one frame to the next

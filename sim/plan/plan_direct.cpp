@@ -22,6 +22,47 @@ std::string unfit_for_direct_light(const SceneSpec& scene, const Plan& plan) {
   return {};
 }
 
+void plan_diffraction(const SceneSpec& scene, Plan& plan, PlanTable& table) {
+  const std::string name = "diffraction";
+  const Switch forced = scene.effects.diffraction;
+  if (!scene.outputs.light()) {
+    table.add(name, false, "no picture is asked for", "");
+    return;
+  }
+  std::string unfit;
+  std::string why;
+  const render::DiffractingAperture aperture = aperture_of(scene.device, plan.bands.centres_nm);
+  const double shortest = plan.bands.centres_nm.minCoeff();
+  if (aperture.in_focus) {
+    constexpr double kAirysDisc = 2.44;  // its diameter, of wavelength times f-number
+    const double disc_um =
+        kAirysDisc * 1e-3 * plan.bands.centres_nm.mean() * aperture.to_sensor_mm / aperture.diameter_mm;
+    why = fmt::format("the stop makes Airy's disc of points, {:.2g} um wide; pixels are {:.3g} um wide", disc_um,
+                      scene.device.camera->pixel_pitch_um);
+  } else {
+    const double most = fresnel_number(aperture, shortest);
+    why = fmt::format(
+        "Fresnel's number of the hole is {:.2g}: at 1 its picture is sharpest, far above 1 it is the "
+        "hole's disc",
+        most);
+    if (most > render::DiffractionSpread::kMostFresnel) {
+      unfit = fmt::format(
+          "Fresnel's number of the hole is {:.3g}; up to {} diffraction is simulated, beyond it light goes "
+          "straight",
+          most, render::DiffractionSpread::kMostFresnel);
+    }
+  }
+  if (plan.scattering) unfit = "the gel scatters light, which blurs more";
+  if (scene.outputs.events) unfit = "event pixels' pictures are drawn without it";
+  if (forced == Switch::on && !unfit.empty()) fail_at(scene.where, "effects.diffraction: on, but {}", unfit);
+  if (!unfit.empty()) {
+    table.add(name, false, unfit, "");
+    return;
+  }
+  plan.diffraction =
+      table.add_by_need(name, forced, false, why, "tables once, some tenths of a second; a wider blur of each picture");
+}
+
 void plan_direct_light(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   const std::string name = "direct light";
   const Switch forced = scene.effects.direct_light;

@@ -11,6 +11,11 @@ namespace touchstone::sim {
 /// @pre the plan's other rows of light and time are made
 std::string unfit_for_direct_light(const SceneSpec& scene, const Plan& plan);
 
+/// Does the hole's or stop's diffraction (render/cameras/diffraction_spread.h) count? Only where it was measured to
+/// change more than is allowed, or the scene switches it on. @pre as above
+/// @throws Error if the scene switches it on and can't have it
+void plan_diffraction(const SceneSpec& scene, Plan& plan, PlanTable& table);
+
 /// Is direct light from a light field (render/direct/direct_renderer.h) worth a try? @pre as above
 /// @throws Error if the scene switches it on and is unfit
 void plan_direct_light(const SceneSpec& scene, Plan& plan, PlanTable& table);

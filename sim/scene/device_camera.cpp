@@ -71,6 +71,37 @@ render::Camera camera_of(const CameraSpec& camera) {
   return out;
 }
 
+render::DiffractingAperture aperture_of(const DeviceSpec& device, const render::Spectrum& wavelengths_nm) {
+  const CameraSpec& camera = *device.camera;
+  const render::Camera geometric = camera_of(camera);
+  render::DiffractingAperture aperture;
+  aperture.wavelengths_nm = wavelengths_nm;
+  double pitch_mm = 1e-3 * camera.pixel_pitch_um;
+  if (const auto* lens = std::get_if<render::LensCamera>(&geometric)) {
+    aperture.diameter_mm = lens->aperture_mm;
+    aperture.to_sensor_mm = render::sensor_distance_mm(*lens);
+    aperture.in_focus = true;
+  } else {
+    const auto& hole = std::get<render::PinholeCamera>(geometric);
+    aperture.diameter_mm = 1e-3 * hole.hole_diameter_um;
+    aperture.foil_mm = 1e-3 * hole.foil_thickness_um;
+    aperture.to_sensor_mm = hole.distance_mm;
+    const double gel = device.gel.thickness_mm;
+    const double plate = device.plate.thickness_mm;
+    const double air = std::max(0.0, -camera.position_mm.z() - gel - plate);
+    aperture.per_object_mm = 1.0 / (air + plate / device.plate.refractive_index + gel / device.gel.refractive_index);
+  }
+  aperture.farthest_mm = 0.5 * pitch_mm * std::hypot(camera.width, camera.height);
+  return aperture;
+}
+
+render::Camera diffracting_camera(const DeviceSpec& device, const render::Spectrum& wavelengths_nm) {
+  render::Camera camera = camera_of(*device.camera);
+  const auto spread = std::make_shared<const render::DiffractionSpread>(aperture_of(device, wavelengths_nm));
+  std::visit([&](auto& one) { one.diffraction = spread; }, camera);
+  return camera;
+}
+
 double blur_disc_px(const render::Camera& camera, double distance_mm) {
   if (const auto* lens = std::get_if<render::LensCamera>(&camera)) {
     return 1e3 * render::blur_circle_mm(*lens, distance_mm) / lens->pixel_pitch_um;

@@ -16,6 +16,13 @@ render::PinholeCamera pinhole_camera(const CameraSpec& camera);
 /// distortion can't be inverted inside the picture
 render::Camera camera_of(const CameraSpec& camera);
 
+/// A device's hole or stop as diffraction takes it, for light of these wavelengths. What a hole looks at is the gel's
+/// outer face, at its apparent depth along z (air, plate and gel, each over its index). @pre the device has a camera
+render::DiffractingAperture aperture_of(const DeviceSpec& device, const render::Spectrum& wavelengths_nm);
+
+/// camera_of() with diffraction. @throws Error as that @pre as DiffractionSpread
+render::Camera diffracting_camera(const DeviceSpec& device, const render::Spectrum& wavelengths_nm);
+
 /// The diameter in pixels of the disc to which a point at `distance_mm` before the camera is blurred by hole or lens.
 double blur_disc_px(const render::Camera& camera, double distance_mm);
 

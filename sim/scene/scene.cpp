@@ -76,6 +76,7 @@ void fields(YamlReader& in, EffectSwitches& effects) {
   in.optional("inertia", effects.inertia);
   in.optional("interreflection", effects.interreflection);
   in.optional("translucent_coating", effects.translucent_coating);
+  in.optional("diffraction", effects.diffraction);
   in.optional("direct_light", effects.direct_light);
   in.optional("shared_paths", effects.shared_paths);
   in.optional("motion_blur", effects.motion_blur);

@@ -90,6 +90,7 @@ struct EffectSwitches {
   Switch inertia = Switch::automatic;
   Switch interreflection = Switch::automatic;
   Switch translucent_coating = Switch::automatic;
+  Switch diffraction = Switch::automatic;
   Switch direct_light = Switch::automatic;
   Switch shared_paths = Switch::automatic;
   Switch motion_blur = Switch::automatic;

@@ -12,7 +12,6 @@
 #include "render/cameras/still_view.h"
 #include "sim/plan/plan_direct.h"
 #include "sim/press/play_motion.h"
-#include "sim/scene/device_camera.h"
 #include "sim/scene/device_gel.h"
 #include "sim/scene/device_imager.h"
 #include "sim/sensor/background_light.h"
@@ -109,7 +108,8 @@ std::string light_key(const VirtualSensorSettings& settings) {
   if (settings.light_key.empty()) return {};
   const EffectSwitches& effects = settings.effects;
   std::string switches;
-  for (const Switch one : {effects.interreflection, effects.translucent_coating, effects.fine_relief}) {
+  for (const Switch one :
+       {effects.interreflection, effects.translucent_coating, effects.fine_relief, effects.diffraction}) {
     switches += fmt::format(" {}", static_cast<int>(one));
   }
   return sha256_of(fmt::format("touchstone light, format {}, {} {} {} {} {} {} {} {} {} {}{}\n{}", kLightFormat,
@@ -152,7 +152,7 @@ class CoatedView final : public SensorView {
     const double radius = judged_ball().shape.radius_mm;
     const double above = radius + kClearance_mm;
     rest_ = at_rest(play(straight_press(above, above)).front().press);
-    camera_ = camera_of(*device_.camera);
+    camera_ = planned_camera(judged_->scene, judged_->plan);
     ready_ = render::make_ready(camera_);
     rest_seen_ = judged_->geometry(rest_, {});
     // Sheet and frame: then the sheet alone moves.

@@ -37,7 +37,7 @@ struct VirtualCamera::Parts : SceneView {
   Parts(const SceneSpec& scene_of, const Plan& plan_of, const fem::Compliance& gel_of)
       : SceneView(scene_of, plan_of, gel_of),
         exposure(scene_of, plan_of),
-        camera(camera_of(*scene.device.camera)),
+        camera(planned_camera(scene, plan)),
         ready(render::make_ready(camera)),
         size(render::size_of(camera).x(), render::size_of(camera).y()),
         imager(sim::imager(scene.device, plan.bands, plan.sensor_noise)),
@@ -111,7 +111,10 @@ struct VirtualCamera::Parts : SceneView {
 
   ChangeFinder change_finder() const {
     const double nearest = std::max(1e-3, -scene.device.gel.thickness_mm - scene.device.camera->position_mm.z());
-    const PointBlur blur{least_blur_radius_px(camera), blur_radius_px(camera, nearest)};
+    PointBlur blur{least_blur_radius_px(camera), blur_radius_px(camera, nearest)};
+    if (const auto* spread = std::visit([](const auto& one) { return one.diffraction.get(); }, camera)) {
+      blur.most_px += 1e3 * spread->reach_mm() / scene.device.camera->pixel_pitch_um;
+    }
     return {response, *settings.noise, scene.light.change_tolerance, blur, size};
   }
 

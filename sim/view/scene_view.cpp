@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "sim/plan/scene_bands.h"
+#include "sim/scene/device_camera.h"
 #include "sim/scene/device_gel.h"
 
 namespace touchstone::sim {
@@ -56,6 +57,10 @@ SeenGeometry SceneView::geometry(const fem::PressState& press, const std::option
   seen.inside.surfaces.push_back({pins.tips(press), render::Black{}});
   seen.pins_rest = pins.tips_at_rest().vertices;
   return seen;
+}
+
+render::Camera planned_camera(const SceneSpec& scene, const Plan& plan) {
+  return plan.diffraction ? diffracting_camera(scene.device, plan.bands.centres_nm) : camera_of(*scene.device.camera);
 }
 
 fem::PressState at_rest(fem::PressState press) {

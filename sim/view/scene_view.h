@@ -47,6 +47,9 @@ struct SceneView {
   render::Scene with_pins(render::Scene seen, const fem::PressState& press) const;
 };
 
+/// The device's camera as the plan has it: with diffraction or without. @pre it has one
+render::Camera planned_camera(const SceneSpec& scene, const Plan& plan);
+
 /// The gel of `press` as nothing presses it.
 fem::PressState at_rest(fem::PressState press);
 

@@ -138,30 +138,5 @@ TEST(PinholeTransfer, OnTheAxisOfAThinFoilIsTheDiscs) {
   EXPECT_GT(transfer_at(device, view, {6, 0}, 1.8), transfer_at(device, view, {0, 0}, 1.8) + 0.05);
 }
 
-TEST(Diffraction, LeavesOfAWaveWhatItsTransferSays) {
-  const PinholeOptics optics{0.1, 5.0, 20.0, 0.0069};
-  constexpr int kPeriod = 16;  // px
-  cv::Mat wave(64, 256, CV_32FC2);
-  for (int row = 0; row < wave.rows; ++row) {
-    for (int column = 0; column < wave.cols; ++column) {
-      const auto value = static_cast<float>(1.0 + 0.5 * std::cos(2.0 * kPi * (column + 0.5) / kPeriod));
-      wave.at<cv::Vec2f>(row, column) = {value, 1.0f};
-    }
-  }
-  render::Spectrum wavelengths(2);
-  wavelengths << 540.0, 610.0;
-  const cv::Mat spread = spread_by_diffraction(wave, optics, wavelengths);
-  PinholeOptics hole = optics;
-  hole.pixel_mm = 0.0;
-  const double per_mm = 1.0 / (kPeriod * optics.pixel_mm) * optics.to_sensor_mm / optics.to_object_mm;
-  const double left = transfer_with_diffraction(hole, per_mm, 540.0);
-  ASSERT_GT(left, 0.1);
-  for (int column = 0; column < kPeriod; ++column) {
-    const double expected = 1.0 + 0.5 * left * std::cos(2.0 * kPi * (column + 0.5) / kPeriod);
-    EXPECT_NEAR(spread.at<cv::Vec2f>(32, 128 + column)[0], expected, 1e-3);
-    EXPECT_NEAR(spread.at<cv::Vec2f>(32, 128 + column)[1], 1.0, 1e-5);
-  }
-}
-
 }  // namespace
 }  // namespace touchstone::lab

@@ -45,6 +45,22 @@ TEST(SceneNeeds, WhatReflectsNothingCallsForNoInterreflection) {
   EXPECT_GT(*change_of(needs_of(small_scene()), "interreflection")->pixel_noise, 1.0);
 }
 
+// What the coating and the housing throw back lights the whole pad, pressed or not; a background recorded of the unit
+// has it already, so only what a dent changes of it is left to leave out.
+TEST(SceneNeeds, ABackgroundGivesBackWhatIsMissingAtRest) {
+  SceneSpec scene = read_scene(std::filesystem::path(TOUCHSTONE_SOURCE_DIR) / "scenes/gelsight/ball-drag-mini.yaml");
+  scene.device =
+      read_yaml<DeviceSpec>(std::filesystem::path(TOUCHSTONE_SOURCE_DIR) / "scenes/devices/gelsight-mini.yaml");
+  scene.device.mesh.fine_mm = 1.0;
+  scene.device.mesh.coarse_mm = 2.5;
+  scene.motion.keys.resize(1);
+  ASSERT_FALSE(scene.device.background.empty());
+  const double with = *change_of(needs_of(scene), "interreflection")->pixel_noise;
+  scene.device.background = cv::Mat();
+  const double without = *change_of(needs_of(scene), "interreflection")->pixel_noise;
+  EXPECT_LT(with, 0.1 * without);
+}
+
 // A punch sticking to a half space of nu = 0.3 is stiffer than one that slides by (1 - nu) log(3 - 4 nu) / (1 - 2 nu),
 // 2.9 % (the bonded punch of [Johnson1985, sec. 3.8]); on a layer it is of that order.
 TEST(SceneNeeds, FrictionOfAStraightPressIsMeasured) {
