@@ -62,7 +62,11 @@ void bench(const BenchOptions& options, const GlobalOptions& global) {
   for (const std::string& note : result.notes) spdlog::warn("{}", note);
   lab::write_study(result, options.out);
   print_estimator(measured);
-  if (!settings.estimator.alone) print_choice(measured.choice);
+  for (const lab::PlannedWay& way : measured.planned.ways) {
+    fmt::print("as planned {}: force {:.2g} % off, pixels {:.2g} of the noise, {:.3g} s a frame\n", way.name,
+               100.0 * measured.planned.force_error, way.pixel_error, way.frame_s);
+  }
+  if (!settings.estimator.alone && !settings.planned_alone) print_choice(measured.choice);
   for (const lab::StudyFile& written : result.files) fmt::print("{}\n", (options.out / written.name).string());
 }
 
@@ -90,6 +94,11 @@ void add_bench_command(CLI::App& app, const GlobalOptions& global, Action& actio
                     "Leave out what the device's own estimator errs by, which takes up to ten minutes");
   command->add_flag("--only-estimator", options->settings.estimator.alone, "Measure that alone")
       ->excludes("--no-estimator");
+  command
+      ->add_flag(
+          "--only-planned", options->settings.planned_alone,
+          "Measure what the device's plans hold as they are, by fixed shares and by need, without curves: minutes")
+      ->excludes("--only-estimator");
   command->add_option("--training-frames", options->settings.estimator.training_frames,
                       "That the estimator is trained on: an even number (default 12 of heights, 24 of forces)");
   command->add_option("--estimator-row", options->settings.estimator.rows,

@@ -293,6 +293,11 @@ DeviceBench bench_device(const sim::DeviceSpec& device, const BenchSettings& set
   tell("the reference's pictures");
   bench.pictures = prepare_pictures(parts);
   bench.least_pixel_error = parts.least_pixel_error;
+  if (settings.planned_alone) {
+    bench.reference = reference_in_words(parts, {});
+    bench.planned = planned_bench(parts, progress);
+    return bench;
+  }
 
   bench.curves.push_back(mesh_curve(parts, progress));
   bench.reference = reference_in_words(parts, bench.curves.back());
@@ -303,6 +308,7 @@ DeviceBench bench_device(const sim::DeviceSpec& device, const BenchSettings& set
   for (BenchCurve& curve : light_curves(parts, tries, progress)) bench.curves.push_back(std::move(curve));
   bench.choice = cheapest_choice(parts, bench.curves.front(), tries, progress);
   bench.effects = effect_shares(parts, progress);
+  bench.planned = planned_bench(parts, progress);
   if (settings.estimator.on) {
     try {
       bench.estimator = estimator();

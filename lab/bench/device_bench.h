@@ -28,6 +28,7 @@ struct BenchSettings {
   int most_pixels = 160 * 120;            ///< pictures are compared on so many of their middle
   int most_tetrahedra = 45000;            ///< of the reference's mesh; so many take some 2 GB and a minute
   bool finite_strain = true;              ///< one press at finite strain, which takes up to minutes
+  bool planned_alone = false;             ///< what plans hold as they are, without curves or a choice
   EstimatorSettings estimator;
   std::uint64_t seed = 1;
 };
@@ -90,6 +91,24 @@ struct EffectShare {
   std::string note;
 };
 
+/// Pictures as a plan has them.
+struct PlannedWay {
+  std::string name;                              ///< "by need"
+  std::string effects;                           ///< those that are on, of what either plan may switch
+  double pixel_error = kUnknown;                 ///< root mean square, of the imager's noise
+  double once_s = kUnknown, frame_s = kUnknown;  ///< of whole pictures
+  std::string note;                              ///< why there is no error
+};
+
+/// The device as its file has it, planned by fixed shares and by need, on presses that nothing was chosen by.
+struct PlannedBench {
+  double force_error = kUnknown;  ///< of its mesh: relative
+  std::vector<PlannedWay> ways;   ///< by fixed shares, by need
+  bool finite_strain = false;     ///< by need; not in the errors, as references are linear
+  bool by_middle = false;         ///< as BenchChoice
+  std::string needs;              ///< in words: what leaving each effect out was measured to change
+};
+
 /// All that a device's bench found.
 struct DeviceBench {
   std::string device;
@@ -100,6 +119,7 @@ struct DeviceBench {
   std::vector<BenchCurve> curves;
   BenchChoice choice;
   std::vector<EffectShare> effects;
+  PlannedBench planned;
   std::optional<EstimatorBench> estimator;  ///< nothing where it was left out
   BenchSettings settings;
 };

@@ -116,9 +116,7 @@ struct Verified {
 
 /// The choice and the device as it is on presses that nothing was chosen by.
 Verified verify(const BenchParts& parts, const BenchChoice& choice, const LightSetting* light, std::uint64_t seed) {
-  BenchParts other = parts;
-  other.presses.specs = bench_presses(kVerifyingPresses, parts.whole_device.mesh.fine_mm, parts.depth_mm, seed);
-  other.finest_forces = solve_presses(other.presses, parts.finest_gel, parts.device, parts.finest_device.mesh.fine_mm);
+  const BenchParts other = with_other_presses(parts, seed);
   const sim::DeviceSpec device = with_edges(parts.device, choice.edges);
   const fem::Compliance gel = make_gel(device).gel;
   Verified verified;
@@ -137,12 +135,15 @@ Verified verify(const BenchParts& parts, const BenchChoice& choice, const LightS
   return verified;
 }
 
-struct WholeSeconds {
-  double once = 0.0, frame = 0.0;
-  bool by_middle = false;
-};
+}  // namespace
 
-/// Of whole pictures; from the middle, whose seconds `light` has, where they would take too long.
+BenchParts with_other_presses(const BenchParts& parts, std::uint64_t seed) {
+  BenchParts other = parts;
+  other.presses.specs = bench_presses(kVerifyingPresses, parts.whole_device.mesh.fine_mm, parts.depth_mm, seed);
+  other.finest_forces = solve_presses(other.presses, parts.finest_gel, parts.device, parts.finest_device.mesh.fine_mm);
+  return other;
+}
+
 WholeSeconds whole_seconds(const BenchParts& parts, double edges, const LightSetting& light) {
   WholeSeconds seconds;
   double times = 1.0;
@@ -151,7 +152,10 @@ WholeSeconds whole_seconds(const BenchParts& parts, double edges, const LightSet
     const sim::CameraSpec& middle = *parts.device.camera;
     times = static_cast<double>(whole.width) * whole.height / (static_cast<double>(middle.width) * middle.height);
     const auto pictures = static_cast<double>(parts.truth->runs[0].electrons.size());
-    seconds.by_middle = pictures * times * light.each_s > kMostWholeSeconds;
+    sim::SceneSpec scene = bench_scene(parts.whole_device, parts.presses, parts.presses.specs.front(), 1);
+    scene.effects = light.effects;
+    // Where pixels share their light a whole picture takes far less than the middle says, which has the contact's edge.
+    seconds.by_middle = !sim::make_plan(scene).shared_paths && pictures * times * light.each_s > kMostWholeSeconds;
   }
   const sim::DeviceSpec device = with_edges(seconds.by_middle ? parts.device : parts.whole_device, edges);
   const MadeGel made = make_gel(device);
@@ -164,8 +168,6 @@ WholeSeconds whole_seconds(const BenchParts& parts, double edges, const LightSet
   seconds.frame = run.mechanics_seconds + (seconds.by_middle ? times : 1.0) * run.picture_seconds;
   return seconds;
 }
-
-}  // namespace
 
 HoldingMesh coarsest_holding(const BenchCurve& mesh, double force_error, double pixel_error) {
   std::vector<const BenchPoint*> by_edge;

@@ -233,16 +233,25 @@ BenchCurve membrane_curve(const BenchParts& parts, const sim::Plan& plan, const 
 void find_exact_effects(BenchParts& parts) {
   sim::SceneSpec scene = bench_scene(parts.device, parts.presses, parts.presses.specs.front(), 1);
   const sim::Plan plan = sim::make_plan(scene);
-  scene.effects.interreflection = sim::Switch::on;
+  std::vector<std::string> left_out;
+  for (const sim::SwitchedEffect& one :
+       {sim::SwitchedEffect{"interreflection", &sim::EffectSwitches::interreflection, &sim::Plan::interreflection},
+        sim::SwitchedEffect{"fine relief", &sim::EffectSwitches::fine_relief, &sim::Plan::fine_relief},
+        sim::SwitchedEffect{"diffraction", &sim::EffectSwitches::diffraction, &sim::Plan::diffraction}}) {
+    sim::SceneSpec with = scene;
+    with.effects.*one.of = sim::Switch::on;
+    try {
+      if (!(sim::make_plan(with).*one.planned)) continue;
+    } catch (const Error&) {
+      continue;  // this device has none
+    }
+    scene = with;
+    if (!(plan.*one.planned)) left_out.emplace_back(one.name);
+  }
   parts.exact = scene.effects;
-  if (!plan.interreflection) parts.exact_words = ", with interreflection";
-  try {
-    scene.effects.fine_relief = sim::Switch::on;
-    if (!sim::make_plan(scene).fine_relief) return;
-    parts.exact = scene.effects;
-    if (!plan.fine_relief) parts.exact_words += parts.exact_words.empty() ? ", with fine relief" : " and fine relief";
-  } catch (const Error&) {
-    return;  // this device has none
+  for (std::size_t k = 0; k < left_out.size(); ++k) {
+    parts.exact_words += k == 0 ? ", with " : k + 1 == left_out.size() ? " and " : ", ";
+    parts.exact_words += left_out[k];
   }
 }
 

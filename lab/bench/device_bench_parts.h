@@ -117,6 +117,22 @@ HoldingMesh coarsest_holding(const BenchCurve& mesh, double force_error, double 
 BenchChoice cheapest_choice(const BenchParts& parts, BenchCurve& mesh, const std::vector<LightSetting>& tries,
                             const Progress& progress);
 
+/// The same parts with other presses, as many, and the finest gel's forces of them; pictures stay the first ones'.
+BenchParts with_other_presses(const BenchParts& parts, std::uint64_t seed);
+
+/// What whole pictures take.
+struct WholeSeconds {
+  double once = 0.0, frame = 0.0;
+  bool by_middle = false;  ///< see BenchChoice
+};
+/// With the mesh's edges times `edges`; from the middle, whose seconds `light` has, where they would take too long.
+WholeSeconds whole_seconds(const BenchParts& parts, double edges, const LightSetting& light);
+
+/// Both plans, by fixed shares and by need. @pre prepare_pictures() has been called
+PlannedBench planned_bench(const BenchParts& parts, const Progress& progress);
+/// Its section of the page.
+std::string planned_page(const DeviceBench& bench);
+
 /// The effects that scenes can switch, by the names that pages show.
 std::span<const sim::SwitchedEffect> switched_effects();
 

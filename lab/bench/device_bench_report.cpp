@@ -202,6 +202,7 @@ std::string choice_in_words(const DeviceBench& bench) {
     };
     add("interreflection", choice.effects.interreflection);
     add("fine_relief", choice.effects.fine_relief);
+    add("diffraction", choice.effects.diffraction);
     add("direct_light", choice.effects.direct_light);
     add("shared_paths", choice.effects.shared_paths);
     if (!switches.empty()) text += fmt::format("effects: {{{}}}\n", switches);
@@ -260,7 +261,10 @@ StudyResult report(const DeviceBench& bench, const std::string& text) {
     result.files.push_back({"bench.csv", csv_of(bench)});
     return result;
   }
-  std::string page = fmt::format("# What accuracy costs: {}\n\n{}\n", bench.device, choice_in_words(bench));
+  const bool planned_alone = bench.settings.planned_alone;
+  const std::string planned = planned_page(bench);
+  std::string page =
+      fmt::format("# What accuracy costs: {}\n\n{}\n", bench.device, planned_alone ? planned : choice_in_words(bench));
   page += fmt::format(
       "## How it was measured\n\n- Presses: {}.\n- Pictures: {}.\n- Reference: {}; light by paths, each pixel by "
       "itself, twice with other random numbers: the product of the differences from both is free of the reference's "
@@ -272,13 +276,17 @@ StudyResult report(const DeviceBench& bench, const std::string& text) {
     page += fmt::format("## {}{}\n\n{}\n\n", static_cast<char>(std::toupper(curve.name[0])), curve.name.substr(1),
                         curve.what);
     if (const auto plot = plot_of(curve, least_pixel_error)) {
-      const std::string name = fmt::format("bench-{}.svg", file_name(curve.name));
+      const std::string name = fmt::format("{}-{}.svg", file_name(bench.device), file_name(curve.name));
       result.files.push_back({name, plots::to_svg(*plot)});
       page += fmt::format("![Error against seconds]({})\n\n", name);
     }
     page += table_of(curve, least_pixel_error) + "\n";
   }
-  page += "## Effects\n\n" + effects_table(bench);
+  if (planned_alone) {
+    result.files.push_back({"bench.md", page});
+    return result;
+  }
+  page += planned + "\n## Effects\n\n" + effects_table(bench);
   if (bench.estimator) page += "\n" + estimator_page(*bench.estimator, result.files);
   result.files.insert(result.files.begin(), {"bench.md", page});
   result.files.push_back({"bench.csv", csv_of(bench)});

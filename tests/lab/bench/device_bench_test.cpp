@@ -199,12 +199,17 @@ TEST(DeviceBench, NoiseFallsAtLeastAsTheRootOfThePaths) {
 
 TEST(DeviceBench, CurvesOfPathsEndWhereTheyAreGoodEnough) {
   std::vector<double> errors;
+  bool left_out = false;  // as a slow machine would take too long for it
   for (const BenchPoint& one : curve(clear_bench(), "light").points) {
-    if (one.setting.starts_with("paths to")) errors.push_back(one.pixel_error);
+    if (!one.setting.starts_with("paths to")) continue;
+    left_out = one.note.starts_with("left out");
+    if (!left_out) errors.push_back(one.pixel_error);
   }
   ASSERT_FALSE(errors.empty());
-  EXPECT_LT(errors.back(), 0.7) << "of the wanted 1";
-  errors.pop_back();
+  if (!left_out) {
+    EXPECT_LT(errors.back(), 0.7) << "of the wanted 1";
+    errors.pop_back();
+  }
   for (const double error : errors) EXPECT_GE(error, 0.7);
 }
 
@@ -237,6 +242,19 @@ TEST(DeviceBench, TellsWhatEachEffectBuys) {
   EXPECT_GT(share("finite strain (neo-Hookean)").force_change, 0.0);
 }
 
+TEST(DeviceBench, SaysWhatItsPlansHold) {
+  const PlannedBench& planned = clear_bench().planned;
+  ASSERT_EQ(planned.ways.size(), 2u);
+  EXPECT_GT(planned.force_error, 0.0);
+  EXPECT_LT(planned.force_error, 0.2);
+  for (const PlannedWay& way : planned.ways) {
+    EXPECT_TRUE(std::isfinite(way.pixel_error)) << way.name << ": " << way.note;
+    EXPECT_GT(way.frame_s, 0.0);
+  }
+  EXPECT_LE(planned.ways[1].pixel_error, std::max(1.0, planned.ways[0].pixel_error)) << "by need it is no worse";
+  EXPECT_THAT(planned.needs, HasSubstr("interreflection pixels by"));
+}
+
 TEST(DeviceBench, ReportsAPageATableAndADeviceThatCanBeRead) {
   const std::string text =
       "name: small\nmesh: {fine_mm: 0.8, coarse_mm: 2, fine_half_extent_mm: [3, 3], fine_depth_mm: 1}\n";
@@ -249,7 +267,8 @@ TEST(DeviceBench, ReportsAPageATableAndADeviceThatCanBeRead) {
   };
   EXPECT_THAT(file("bench.md"), HasSubstr("# What accuracy costs: small"));
   EXPECT_THAT(file("bench.md"), HasSubstr("It holds on them"));
-  EXPECT_THAT(file("bench-mesh.svg"), HasSubstr("<svg"));
+  EXPECT_THAT(file("bench.md"), HasSubstr("## As planned"));
+  EXPECT_THAT(file("small-mesh.svg"), HasSubstr("<svg"));
   EXPECT_THAT(file("small.yaml"),
               HasSubstr(fmt::format("fine_mm: {:.4g}", std::round(1e4 * clear_bench().choice.fine_mm) / 1e4)));
   const std::string csv = file("bench.csv");
