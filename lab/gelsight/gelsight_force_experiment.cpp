@@ -53,10 +53,10 @@ double diameter_px(const sim::VirtualSensor& sensor) {
 sensors::MarkerTrackerSettings marker_settings(const sim::VirtualSensor& sensor) {
   const auto& print = sensor.device().coating->print;
   if (!print) fail("device {}: has no markers", sensor.device().name);
-  sensors::MarkerTrackerSettings settings;
-  settings.appearance.diameter_px = print->width_mm / sensor.mm_per_px();
-  settings.appearance.spacing_px = print->spacing_mm.minCoeff() / sensor.mm_per_px();
-  return settings;
+  sensors::MarkerAppearance appearance;
+  appearance.diameter_px = print->width_mm / sensor.mm_per_px();
+  appearance.spacing_px = print->spacing_mm.minCoeff() / sensor.mm_per_px();
+  return {.appearance = appearance};
 }
 
 cv::Mat without_markers(const cv::Mat& frame, const sensors::TrackedMarkers* markers, double diameter) {

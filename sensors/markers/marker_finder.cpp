@@ -22,20 +22,47 @@ void check_range(const char* name, double value, double low, double high) {
 }  // namespace
 
 MarkerFinder::MarkerFinder(const MarkerAppearance& appearance) : appearance_(appearance) {
-  check_range("diameter_px", appearance.diameter_px, 2.0, 64.0);
-  check_range("spacing_px", appearance.spacing_px, appearance.diameter_px, 256.0);
-  check_range("darkness", appearance.darkness, 0.1, 0.95);
+  check_range("diameter_px", appearance.diameter_px, 2.0, 256.0);
+  check_range("spacing_px", appearance.spacing_px, appearance.diameter_px, 1024.0);
+  check_range("darkness", appearance.darkness, 0.1, 0.99);
   check_range("least_difference", appearance.least_difference, 0.0, 255.0);
   check_range("least_area", appearance.least_area, 0.0, 1.0);
   blobs_.reserve(kMostBlobs);
 }
 
-const std::vector<MarkerBlob>& MarkerFinder::find(const cv::Mat& image) {
+const char* name_of(MarkerPolarity polarity) {
+  return polarity == MarkerPolarity::kDark ? "dark" : "bright";
+}
+
+FrameLight marker_brightness(const cv::Mat& image, cv::Mat& brightness) {
   if (image.empty()) fail("markers: the picture is empty");
   if (image.type() != CV_8UC1 && image.type() != CV_8UC3) {
     fail("markers: the picture has {} channels of depth {}, 8 bit grey or BGR is needed", image.channels(),
          image.depth());
   }
+  brightness.create(image.rows, image.cols, CV_8UC1);
+  std::uint8_t low = 255, high = 0;
+  std::int64_t sum = 0;
+  for (int y = 0; y < image.rows; ++y) {
+    const std::uint8_t* in = image.ptr<std::uint8_t>(y);
+    std::uint8_t* out = brightness.ptr<std::uint8_t>(y);
+    std::int64_t row_sum = 0;
+    for (int x = 0; x < image.cols; ++x) {
+      const std::uint8_t value = image.channels() == 3 ? std::max({in[3 * x], in[3 * x + 1], in[3 * x + 2]}) : in[x];
+      out[x] = value;
+      row_sum += value;
+      low = std::min(low, value);
+      high = std::max(high, value);
+    }
+    sum += row_sum;
+  }
+  const FrameLight light =
+      light_of_mean(static_cast<double>(sum) / (255.0 * static_cast<double>(image.rows) * image.cols));
+  return light == FrameLight::kNormal && low == high ? FrameLight::kFlat : light;
+}
+
+const std::vector<MarkerBlob>& MarkerFinder::find(const cv::Mat& image) {
+  if (image.empty()) fail("markers: the picture is empty");
   if (image.cols < appearance_.spacing_px || image.rows < appearance_.spacing_px) {
     fail("markers: the picture is {} x {} px, smaller than their spacing of {} px", image.cols, image.rows,
          appearance_.spacing_px);
@@ -43,11 +70,12 @@ const std::vector<MarkerBlob>& MarkerFinder::find(const cv::Mat& image) {
   if (width_ != 0 && (image.cols != width_ || image.rows != height_)) {
     fail("markers: the picture is {} x {} px, the first one was {} x {}", image.cols, image.rows, width_, height_);
   }
+  light_ = marker_brightness(image, brightness_);
   blobs_.clear();
   last_label_ = 0;
-  read_brightness(image);
+  make_room(image);
   if (light_ != FrameLight::kNormal) return blobs_;
-  mark_dark_pixels();
+  mark_pixels();
   for (int y = 0; y < height_; ++y) {
     for (int x = 0; x < width_; ++x) {
       if (label_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)] != -1) {
@@ -60,50 +88,32 @@ const std::vector<MarkerBlob>& MarkerFinder::find(const cv::Mat& image) {
   return blobs_;
 }
 
-void MarkerFinder::read_brightness(const cv::Mat& image) {
+void MarkerFinder::make_room(const cv::Mat& image) {
   width_ = image.cols;
   height_ = image.rows;
   const std::size_t pixels = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
-  brightness_.resize(pixels);
   label_.resize(pixels);
   stack_.resize(pixels);
   column_sum_.resize(static_cast<std::size_t>(width_));
-  std::uint8_t low = 255, high = 0;
-  std::int64_t sum = 0;
-  std::uint8_t* out = brightness_.data();
-  for (int y = 0; y < height_; ++y) {
-    const std::uint8_t* in = image.ptr<std::uint8_t>(y);
-    std::int32_t row_sum = 0;
-    for (int x = 0; x < width_; ++x, ++out) {
-      const std::uint8_t value = image.channels() == 3 ? std::max({in[3 * x], in[3 * x + 1], in[3 * x + 2]}) : in[x];
-      *out = value;
-      row_sum += value;
-      low = std::min(low, value);
-      high = std::max(high, value);
-    }
-    sum += row_sum;
-  }
-  light_ = light_of_mean(static_cast<double>(sum) / (255.0 * static_cast<double>(pixels)));
-  if (light_ == FrameLight::kNormal && low == high) light_ = FrameLight::kFlat;
 }
 
-void MarkerFinder::mark_dark_pixels() {
+void MarkerFinder::mark_pixels() {
   // The window's mean by running sums: of columns over rows, then of those along the row.
   const int reach = static_cast<int>(std::lround(0.75 * appearance_.spacing_px));
-  const auto row_of = [&](int y) {
-    return brightness_.data() + static_cast<std::ptrdiff_t>(y) * static_cast<std::ptrdiff_t>(width_);
-  };
   const auto add_row = [&](int y, int sign) {
-    const std::uint8_t* row = row_of(y);
+    const std::uint8_t* row = brightness_.ptr<std::uint8_t>(y);
     for (int x = 0; x < width_; ++x) column_sum_[static_cast<std::size_t>(x)] += sign * row[x];
   };
+  const bool is_dark = appearance_.polarity == MarkerPolarity::kDark;
+  const auto darkness = static_cast<float>(appearance_.darkness);
+  const auto least_difference = static_cast<float>(appearance_.least_difference);
   std::fill(column_sum_.begin(), column_sum_.end(), 0);
   for (int y = 0; y < std::min(reach, height_); ++y) add_row(y, 1);
   for (int y = 0; y < height_; ++y) {
     if (y + reach < height_) add_row(y + reach, 1);
     if (y - reach - 1 >= 0) add_row(y - reach - 1, -1);
     const int rows = std::min(y + reach, height_ - 1) - std::max(y - reach, 0) + 1;
-    const std::uint8_t* row = row_of(y);
+    const std::uint8_t* row = brightness_.ptr<std::uint8_t>(y);
     std::int32_t* label = label_.data() + static_cast<std::ptrdiff_t>(y) * static_cast<std::ptrdiff_t>(width_);
     std::int32_t window = 0;
     for (int x = 0; x < std::min(reach, width_); ++x) window += column_sum_[static_cast<std::size_t>(x)];
@@ -113,9 +123,9 @@ void MarkerFinder::mark_dark_pixels() {
       const int columns = std::min(x + reach, width_ - 1) - std::max(x - reach, 0) + 1;
       const float mean = static_cast<float>(window) / static_cast<float>(rows * columns);
       const float value = row[x];
-      const bool dark = value < static_cast<float>(appearance_.darkness) * mean &&
-                        mean - value >= static_cast<float>(appearance_.least_difference);
-      label[x] = dark ? -1 : 0;
+      const float dark = is_dark ? value : mean;
+      const float bright = is_dark ? mean : value;
+      label[x] = dark < darkness * bright && bright - dark >= least_difference ? -1 : 0;
     }
   }
 }
@@ -161,7 +171,7 @@ Eigen::Vector2d MarkerFinder::weighted_centroid(const MarkerBlob& blob, std::int
       const std::size_t row = static_cast<std::size_t>(y) * static_cast<std::size_t>(width_);
       for (int x = std::max(blob.left - margin, 0); x <= std::min(blob.right + margin, width_ - 1); ++x) {
         const std::size_t pixel = row + static_cast<std::size_t>(x);
-        use(x, y, label_[pixel], static_cast<double>(brightness_[pixel]));
+        use(x, y, label_[pixel], static_cast<double>(brightness_.at<std::uint8_t>(y, x)));
       }
     }
   };
@@ -169,7 +179,7 @@ Eigen::Vector2d MarkerFinder::weighted_centroid(const MarkerBlob& blob, std::int
     return x >= blob.left - margin && x <= blob.right + margin && y >= blob.top - margin && y <= blob.bottom + margin;
   };
 
-  // Under other dark pixels nothing is known of the background.
+  // Under other markers' pixels nothing is known of the background.
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   for_pixels(kBackgroundMargin_px, [&](int x, int y, std::int32_t owner, double value) {
@@ -179,7 +189,9 @@ Eigen::Vector2d MarkerFinder::weighted_centroid(const MarkerBlob& blob, std::int
     right += value * terms;
   });
   Eigen::Vector3d plane = Eigen::Vector3d::Zero();
-  if (normal(0, 0) >= kLeastBackground_px) plane = normal.ldlt().solve(right);
+  const bool has_background = normal(0, 0) >= kLeastBackground_px;
+  if (has_background) plane = normal.ldlt().solve(right);
+  const bool is_dark = appearance_.polarity == MarkerPolarity::kDark;
 
   double weight_sum = 0.0, x_sum = 0.0, y_sum = 0.0;
   double pixel_x = 0.0, pixel_y = 0.0;
@@ -191,13 +203,13 @@ Eigen::Vector2d MarkerFinder::weighted_centroid(const MarkerBlob& blob, std::int
       return;
     }
     const double background = plane[0] + plane[1] * (x - middle_x) + plane[2] * (y - middle_y);
-    if (!(background >= 1.0)) return;
-    const double weight = 1.0 - value / background;  // of either sign: noise has no mean
+    if (!has_background || (is_dark && !(background >= 1.0))) return;
+    const double weight = is_dark ? 1.0 - value / background : value - background;  // of either sign: noise has no mean
     weight_sum += weight;
     x_sum += weight * x;
     y_sum += weight * y;
   });
-  // A blob amid other dark pixels has no background: its pixels count alike.
+  // A blob amid other markers' pixels has no background: its pixels count alike.
   if (!(weight_sum > 0.0)) {
     weight_sum = blob.area_px;
     x_sum = pixel_x;

@@ -1,12 +1,15 @@
 #pragma once
-// Finds a gel's black markers in one picture: threshold, blobs, centroids [Li2015, sec. 4.3].
+// Finds a gel's markers in one picture: threshold, blobs, centroids [Li2015, sec. 4.3]. The thesis has black dots on a
+// bright membrane; bright tips on a black skin are found by the same steps.
 //
 // What the thesis leaves open, and what is done here:
 // - "Threshold the image": with the mean of a window as wide as 1.5 spacings, so a marker in a lamp's shadow and one in
-//   full light are found alike. A pixel's brightness is its largest channel: a marker is dark in all of them, a slope
-//   that one lamp doesn't reach is lit by the others.
-// - Centroids weigh each pixel by how much darker it is than a plane through the background round the blob, divided by
-//   that plane: the rim's pixels count by what the marker covers of them, and a gradient of light doesn't pull.
+//   full light are found alike. A pixel's brightness is its largest channel: a dark marker is dark in all of them, a
+//   slope that one lamp doesn't reach is lit by the others.
+// - Centroids weigh each pixel by how much it differs from a plane through the background round the blob: the rim's
+//   pixels count by what the marker covers of them. Under dark markers the difference is divided by that plane, so a
+//   gradient of light doesn't pull; beside bright ones there may be no light to divide by.
+// - What markers look like is read from a picture of them (marker_learning.h), unless it is given.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -17,17 +20,29 @@
 
 namespace touchstone::sensors {
 
+/// Whether markers are darker or brighter than the gel between them.
+enum class MarkerPolarity : std::uint8_t { kDark, kBright };
+/// "dark", "bright"
+const char* name_of(MarkerPolarity polarity);
+
 /// What markers look like, in px of the picture. The defaults are the thesis's, 0.4 mm every 1.2 mm, in 320 px over 17
 /// mm.
 struct MarkerAppearance {
-  double diameter_px = 7.5;      ///< 2 to 64
-  double spacing_px = 22.6;      ///< between neighbours' centres; larger than the diameter, at most 256
-  double darkness = 0.65;        ///< a marker's pixels are darker than this part of the window's mean; 0.1 to 0.95
-  double least_difference = 10;  ///< and by at least so many grey levels (of 255)
+  double diameter_px = 7.5;  ///< 2 to 256
+  double spacing_px = 22.6;  ///< between neighbours' centres; larger than the diameter, at most 1024
+  /// A marker's pixels are darker than this part of the window's mean; of bright markers the mean is darker than this
+  /// part of a pixel. 0.1 to 0.99
+  double darkness = 0.65;
+  double least_difference = 10;  ///< and they differ from the mean by at least so many grey levels (of 255)
   double least_area = 0.25;      ///< smaller blobs are noise; a part of a disc of the diameter
+  MarkerPolarity polarity = MarkerPolarity::kDark;
 };
 
-/// One dark region, of 8-connected pixels. Coordinates in px, pixel centres at + 0.5 (core/transform.h).
+/// The largest channel of each pixel (CV_8UC1), and whether there is light in it.
+/// @throws Error unless the picture is 8 bit, grey or BGR, and not empty
+FrameLight marker_brightness(const cv::Mat& image, cv::Mat& brightness);
+
+/// One region that is dark (or bright, as markers are), of 8-connected pixels. Coordinates in px, pixel centres at + 0.5 (core/transform.h).
 struct MarkerBlob {
   Eigen::Vector2d centroid = Eigen::Vector2d::Zero();
   int area_px = 0;
@@ -54,16 +69,16 @@ class MarkerFinder {
   const MarkerAppearance& appearance() const { return appearance_; }
 
  private:
-  void read_brightness(const cv::Mat& image);
-  void mark_dark_pixels();
+  void make_room(const cv::Mat& image);
+  void mark_pixels();
   void take_blob(int x, int y);
   Eigen::Vector2d weighted_centroid(const MarkerBlob& blob, std::int32_t label) const;
 
   MarkerAppearance appearance_;
   FrameLight light_ = FrameLight::kNormal;
   int width_ = 0, height_ = 0;
-  std::vector<std::uint8_t> brightness_;  ///< largest channel
-  std::vector<std::int32_t> label_;       ///< 0 background, -1 dark and not yet taken, else the number of its blob
+  cv::Mat brightness_;
+  std::vector<std::int32_t> label_;  ///< 0 background, -1 a marker's and not yet taken, else the number of its blob
   std::vector<std::int32_t> column_sum_;
   std::vector<std::int32_t> stack_;
   std::int32_t last_label_ = 0;

@@ -1,8 +1,10 @@
 #include "sensors/markers/marker_tracker.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "core/error.h"
 
@@ -13,6 +15,11 @@ namespace {
 constexpr double kNeighbourReach = 1.6;  ///< of the spacing: the eight round a marker of a square grid
 constexpr double kAreaLearning = 0.05;   ///< how fast a marker's usual area follows the measured one, a frame
 constexpr double kAtRest = 0.1;          ///< of the spacing
+constexpr std::size_t kLeastNeighbours = 3, kMostNeighbours = 12;
+constexpr double kFarthest = 1.5;   ///< of the median spacing: a marker that stands alone isn't searched for farther off
+constexpr double kStray = 0.6;      ///< of the distance to the nearest neighbour: off the median of the neighbours' motion
+constexpr double kClearlyLess = 0.7;  ///< of the misfit: only then markers are expected to go on as they went
+constexpr double kMostSteps = 4.0;  ///< of the last step, where frames were dropped
 
 /// The nearest of `places` to `from`, -1 if there's none.
 template <typename Places, typename PlaceOf>
@@ -57,6 +64,8 @@ const char* name_of(MarkerStatus status) {
       return "at border";
     case MarkerStatus::kTooFar:
       return "too far";
+    case MarkerStatus::kStray:
+      return "stray";
   }
   return "?";
 }
@@ -66,7 +75,8 @@ int TrackedMarkers::found() const {
 }
 
 MarkerTracker::MarkerTracker(const MarkerTrackerSettings& settings)
-    : settings_(settings), finder_(settings.appearance) {
+    : settings_(settings) {
+  if (settings.appearance) MarkerFinder{*settings.appearance};  // which checks it
   if (!(settings.longest_step >= 0.05 && settings.longest_step <= 0.5)) {
     fail("marker longest_step is {}, it must be from 0.05 to 0.5 of the spacing", settings.longest_step);
   }
@@ -82,19 +92,25 @@ const TrackedMarkers& MarkerTracker::track(const Frame& frame) {
   if (!first && frame.t_us <= result_.t_us) {
     fail("markers: the frame's time {} us isn't after the last one's, {} us", frame.t_us, result_.t_us);
   }
-  if (first) finder_ = MarkerFinder(settings_.appearance);  // of whatever size this frame has
-  const std::vector<MarkerBlob>& blobs = finder_.find(frame.image);
   if (first) {
-    if (finder_.light() != FrameLight::kNormal) fail("markers: the frame at rest is {}", name_of(finder_.light()));
+    MarkerFinder finder(settings_.appearance ? *settings_.appearance : learn_appearance(frame.image));
+    const std::vector<MarkerBlob>& blobs = finder.find(frame.image);
+    if (finder.light() != FrameLight::kNormal) fail("markers: the frame at rest is {}", name_of(finder.light()));
     begin(blobs);
-  } else if (finder_.light() != FrameLight::kNormal) {
-    std::fill(result_.status.begin(), result_.status.end(), MarkerStatus::kHidden);
-    std::fill(result_.area_px.begin(), result_.area_px.end(), 0);
-    result_.unclaimed = 0;
+    finder_ = std::move(finder);
+    seen_us_ = static_cast<double>(frame.t_us);
+    step_us_ = 0.0;
   } else {
-    follow(blobs);
+    const std::vector<MarkerBlob>& blobs = finder_->find(frame.image);
+    if (finder_->light() == FrameLight::kNormal) {
+      follow(blobs, frame.t_us);
+    } else {
+      std::fill(result_.status.begin(), result_.status.end(), MarkerStatus::kHidden);
+      std::fill(result_.area_px.begin(), result_.area_px.end(), 0);
+      result_.unclaimed = 0;
+    }
   }
-  result_.light = finder_.light();
+  result_.light = finder_->light();
   result_.t_us = frame.t_us;
   return result_;
 }
@@ -126,24 +142,31 @@ void MarkerTracker::begin(const std::vector<MarkerBlob>& blobs) {
     fail("markers: the frame at rest shows {} of them, at least {} are needed", rest.size(), kLeastMarkers);
   }
 
+  std::vector<std::vector<std::pair<double, int>>> others(rest.size());  // nearest first
   std::vector<double> distances;
-  for (const Eigen::Vector2d& place : rest) {
-    double least = std::numeric_limits<double>::infinity();
-    for (const Eigen::Vector2d& other : rest) {
-      if (&other != &place) least = std::min(least, (other - place).norm());
+  for (std::size_t i = 0; i < rest.size(); ++i) {
+    for (std::size_t j = 0; j < rest.size(); ++j) {
+      if (i != j) others[i].emplace_back((rest[i] - rest[j]).norm(), static_cast<int>(j));
     }
-    distances.push_back(least);
+    const std::size_t nearest_ones = std::min(kMostNeighbours, others[i].size());
+    std::partial_sort(others[i].begin(), others[i].begin() + static_cast<std::ptrdiff_t>(nearest_ones),
+                      others[i].end());
+    others[i].resize(nearest_ones);
+    distances.push_back(others[i].front().first);
   }
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
+  std::vector<double> sorted = distances;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
   spacing_px_ = *middle;
+  for (double& distance : distances) distance = std::min(distance, kFarthest * spacing_px_);
+  distance_px_ = std::move(distances);
 
   neighbours_.clear();
   neighbour_begin_.assign(1, 0);
-  for (std::size_t i = 0; i < rest.size(); ++i) {
-    for (std::size_t j = 0; j < rest.size(); ++j) {
-      if (i != j && (rest[i] - rest[j]).norm() <= kNeighbourReach * spacing_px_) {
-        neighbours_.push_back(static_cast<int>(j));
+  for (const auto& near : others) {
+    for (std::size_t k = 0; k < near.size(); ++k) {
+      if (k < kLeastNeighbours || near[k].first <= kNeighbourReach * spacing_px_) {
+        neighbours_.push_back(near[k].second);
       }
     }
     neighbour_begin_.push_back(static_cast<int>(neighbours_.size()));
@@ -155,7 +178,11 @@ void MarkerTracker::begin(const std::vector<MarkerBlob>& blobs) {
   result_.area_px = std::move(area_px);
   usual_area_ = std::move(usual_area);
   expected_ = result_.rest;
+  before_ = result_.rest;
+  step_.assign(result_.rest.size(), Eigen::Vector2d::Zero());
   nearest_blob_.assign(result_.rest.size(), -1);
+  strays_.clear();
+  strays_.reserve(result_.rest.size());
 }
 
 bool MarkerTracker::is_at_rest(const std::vector<MarkerBlob>& blobs) {
@@ -179,26 +206,63 @@ Eigen::Vector2d MarkerTracker::carried_by_neighbours(std::size_t marker) const {
   return result_.rest[marker] + sum / found;
 }
 
-void MarkerTracker::predict() {
+/// How badly blobs fit markers that were found and have gone on by so many of their last steps.
+double MarkerTracker::misfit(const std::vector<MarkerBlob>& blobs, double steps) const {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < result_.rest.size(); ++i) {
+    if (!is_found(result_.status[i])) continue;
+    const Eigen::Vector2d place = result_.positions[i] + steps * step_[i];
+    const int blob = nearest(blobs, place_of_blob, place);
+    const double most = settings_.longest_step * distance_px_[i];
+    const double off = blob < 0 ? most : (blobs[static_cast<std::size_t>(blob)].centroid - place).norm();
+    sum += std::min(off * off, most * most);
+  }
+  return sum;
+}
+
+void MarkerTracker::predict(const std::vector<MarkerBlob>& blobs, std::int64_t t_us) {
+  double steps = 0.0;
+  if (step_us_ > 0.0) {
+    const double standing = misfit(blobs, 0.0);
+    double least = kClearlyLess * standing;
+    // By the clock more than one step may have passed since the last frame with light.
+    const double passed = (static_cast<double>(t_us) - seen_us_) / step_us_;
+    for (const double tried : {1.0, std::clamp(passed, 1.0, kMostSteps)}) {
+      const double moving = misfit(blobs, tried);
+      if (moving < least) {
+        least = moving;
+        steps = tried;
+      }
+    }
+  }
   for (std::size_t i = 0; i < expected_.size(); ++i) {
-    expected_[i] = is_found(result_.status[i]) ? result_.positions[i] : carried_by_neighbours(i);
+    expected_[i] =
+        (is_found(result_.status[i]) ? result_.positions[i] : carried_by_neighbours(i)) + steps * step_[i];
   }
 }
 
-void MarkerTracker::follow(const std::vector<MarkerBlob>& blobs) {
+void MarkerTracker::follow(const std::vector<MarkerBlob>& blobs, std::int64_t t_us) {
   if (result_.jumped && is_at_rest(blobs)) {
     expected_ = result_.rest;
     result_.jumped = false;
   } else {
-    predict();
+    predict(blobs, t_us);
   }
+  match(blobs);
+  reject_strays();
+  for (std::size_t i = 0; i < result_.rest.size(); ++i) {
+    if (!is_found(result_.status[i])) result_.positions[i] = carried_by_neighbours(i);
+  }
+  note_steps(t_us);
+}
+
+void MarkerTracker::match(const std::vector<MarkerBlob>& blobs) {
   const std::size_t markers = result_.rest.size();
   for (std::size_t i = 0; i < markers; ++i) nearest_blob_[i] = nearest(blobs, place_of_blob, expected_[i]);
   nearest_marker_.resize(blobs.size());
   claimed_.assign(blobs.size(), 0);
   for (std::size_t b = 0; b < blobs.size(); ++b) nearest_marker_[b] = nearest(expected_, itself, blobs[b].centroid);
 
-  const double longest = settings_.longest_step * spacing_px_;
   for (std::size_t i = 0; i < markers; ++i) {
     const bool was_found = is_found(result_.status[i]);
     MarkerStatus& status = result_.status[i];
@@ -211,7 +275,7 @@ void MarkerTracker::follow(const std::vector<MarkerBlob>& blobs) {
     const bool is_large = blob.area_px > settings_.max_area_change * usual_area_[i];
     if (is_large && (mutual || holds(blob, expected_[i]))) {
       status = MarkerStatus::kMerged;
-    } else if (mutual && (blob.centroid - expected_[i]).norm() <= longest) {
+    } else if (mutual && (blob.centroid - expected_[i]).norm() <= settings_.longest_step * distance_px_[i]) {
       claimed_[static_cast<std::size_t>(index)] = 1;
       if (blob.at_border) {
         status = MarkerStatus::kAtBorder;
@@ -239,9 +303,41 @@ void MarkerTracker::follow(const std::vector<MarkerBlob>& blobs) {
       result_.jumped = true;
     }
   }
-  for (std::size_t i = 0; i < markers; ++i) {
-    if (!is_found(result_.status[i])) result_.positions[i] = carried_by_neighbours(i);
+}
+
+void MarkerTracker::reject_strays() {
+  strays_.clear();
+  for (std::size_t i = 0; i < result_.rest.size(); ++i) {
+    if (!is_found(result_.status[i])) continue;
+    std::array<double, kMostNeighbours> x{}, y{};
+    std::size_t count = 0;
+    for (int n = neighbour_begin_[i]; n < neighbour_begin_[i + 1]; ++n) {
+      const auto other = static_cast<std::size_t>(neighbours_[static_cast<std::size_t>(n)]);
+      if (!is_found(result_.status[other])) continue;
+      const Eigen::Vector2d moved = result_.displacement(other);
+      x[count] = moved.x();
+      y[count++] = moved.y();
+    }
+    if (count < kLeastNeighbours) continue;
+    const auto middle = static_cast<std::ptrdiff_t>(count / 2);
+    std::nth_element(x.begin(), x.begin() + middle, x.begin() + static_cast<std::ptrdiff_t>(count));
+    std::nth_element(y.begin(), y.begin() + middle, y.begin() + static_cast<std::ptrdiff_t>(count));
+    const Eigen::Vector2d usual(x[count / 2], y[count / 2]);
+    if ((result_.displacement(i) - usual).norm() > kStray * distance_px_[i]) strays_.push_back(static_cast<int>(i));
   }
+  for (const int stray : strays_) {  // only now: each was judged by all that were found
+    result_.status[static_cast<std::size_t>(stray)] = MarkerStatus::kStray;
+    result_.area_px[static_cast<std::size_t>(stray)] = 0;
+  }
+}
+
+void MarkerTracker::note_steps(std::int64_t t_us) {
+  for (std::size_t i = 0; i < before_.size(); ++i) {
+    step_[i] = result_.positions[i] - before_[i];
+    before_[i] = result_.positions[i];
+  }
+  step_us_ = static_cast<double>(t_us) - seen_us_;
+  seen_us_ = static_cast<double>(t_us);
 }
 
 }  // namespace touchstone::sensors

@@ -26,7 +26,7 @@ TouchReader::TouchReader(const TouchCalibration& calibration, const TouchReaderS
 }
 
 const TouchReading& TouchReader::read(const Frame& frame) {
-  const double diameter_px = calibration_.markers.appearance.diameter_px;
+  const double diameter_px = tracker_.appearance()->diameter_px;
   const double mm_per_px = calibration_.height.mm_per_px;
   // Either refuses a frame that can't be taken; until then the last reading stays.
   const MotionRatio motion = motion_ratio(calibration_.background, before_, frame.image, settings_.motion, &contact_);

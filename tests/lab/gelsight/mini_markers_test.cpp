@@ -17,14 +17,6 @@ namespace {
 
 const std::filesystem::path kScenes = std::filesystem::path(TOUCHSTONE_SOURCE_DIR) / "scenes";
 
-sensors::MarkerTrackerSettings tracker_of_the_mini() {
-  constexpr double kMmPerPx = 0.0714;
-  sensors::MarkerTrackerSettings settings;
-  settings.appearance.diameter_px = 0.8 / kMmPerPx;
-  settings.appearance.spacing_px = 2.40625 / kMmPerPx;
-  return settings;
-}
-
 TEST(MiniMarkers, ADragIsFollowedDotByDot) {
   // Its gel takes half a minute to set up, once: the Python tests press it, too.
   const std::filesystem::path cache = std::filesystem::path(TOUCHSTONE_BINARY_DIR) / "python" / "cache";
@@ -34,7 +26,7 @@ TEST(MiniMarkers, ADragIsFollowedDotByDot) {
   const render::Scene layers = sim::clear_layers(device);
   const render::ReadyCamera camera = render::make_ready(sim::camera_of(*device.camera));
 
-  sensors::MarkerTracker tracker(tracker_of_the_mini());
+  sensors::MarkerTracker tracker({});
   Frame frame{sensor.background(1), 0};
   tracker.track(frame);
   ASSERT_EQ(tracker.tracked().rest.size(), 63u);

@@ -18,20 +18,6 @@ namespace {
 
 const std::filesystem::path kScenes = std::filesystem::path(TOUCHSTONE_SOURCE_DIR) / "scenes";
 
-sensors::MarkerTrackerSettings tracker_of_pins() {
-  sensors::MarkerTrackerSettings settings;
-  settings.appearance.diameter_px = 12.0;  // in the middle of the picture
-  settings.appearance.spacing_px = 26.0;
-  settings.appearance.darkness =
-      0.85;  // of the negative: the outer tips are well under half as bright as the middle ones
-  return settings;
-}
-
-/// Pins are bright on black, and the tracker looks for dark markers: it's given the negative.
-Frame negative(const cv::Mat& frame, std::int64_t t_us) {
-  return {255 - frame, t_us};
-}
-
 struct Errors {
   double rms = 0.0, worst = 0.0, farthest = 0.0;
 };
@@ -47,8 +33,9 @@ TEST(TacTip, APressAndAShearAreFollowedPinByPin) {
     return render::project_through_faces(layers, camera, point).value();
   };
 
-  sensors::MarkerTracker tracker(tracker_of_pins());
-  tracker.track(negative(sensor.background(1), 0));
+  sensors::MarkerTracker tracker({});
+  tracker.track({sensor.background(1), 0});
+  EXPECT_EQ(tracker.appearance()->polarity, sensors::MarkerPolarity::kBright);
   const std::size_t pins = static_cast<std::size_t>(sensor.marker_places_mm().rows());
   ASSERT_EQ(pins, 217U);
   ASSERT_EQ(tracker.tracked().rest.size(), pins) << "each pin is found at rest, and nothing else";
@@ -74,7 +61,7 @@ TEST(TacTip, APressAndAShearAreFollowedPinByPin) {
     const sim::Touch touch =
         sensor.press(ball, press, {.truth = false, .noise_seed = 10u + static_cast<unsigned>(t_us)});
     t_us += 40000;
-    const sensors::TrackedMarkers& seen = tracker.track(negative(touch.frame, t_us));
+    const sensors::TrackedMarkers& seen = tracker.track({touch.frame, t_us});
     EXPECT_EQ(seen.found(), 217) << touch.what;
     EXPECT_FALSE(seen.jumped);
     double square = 0.0;

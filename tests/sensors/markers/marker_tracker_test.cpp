@@ -269,15 +269,15 @@ TEST(MarkerTracker, BadInputIsRefusedAndChangesNothing) {
   EXPECT_EQ(tracker.track({good, 1}).positions, first.positions);
 
   const auto refuses = [](auto change) {
-    MarkerTrackerSettings settings;
+    MarkerTrackerSettings settings = {.appearance = MarkerAppearance()};
     change(settings);
     EXPECT_THROW(MarkerTracker{settings}, Error);
   };
-  refuses([](auto& s) { s.appearance.diameter_px = 1.0; });
-  refuses([](auto& s) { s.appearance.spacing_px = 5.0; });
-  refuses([](auto& s) { s.appearance.darkness = std::nan(""); });
-  refuses([](auto& s) { s.appearance.least_difference = -1.0; });
-  refuses([](auto& s) { s.appearance.least_area = 2.0; });
+  refuses([](auto& s) { s.appearance->diameter_px = 1.0; });
+  refuses([](auto& s) { s.appearance->spacing_px = 5.0; });
+  refuses([](auto& s) { s.appearance->darkness = std::nan(""); });
+  refuses([](auto& s) { s.appearance->least_difference = -1.0; });
+  refuses([](auto& s) { s.appearance->least_area = 2.0; });
   refuses([](auto& s) { s.longest_step = 0.6; });
   refuses([](auto& s) { s.max_area_change = 1.0; });
 }
