@@ -34,6 +34,15 @@ const char* name_of(MarkerPolarity polarity) {
   return polarity == MarkerPolarity::kDark ? "dark" : "bright";
 }
 
+bool is_compact(const MarkerBlob& blob) {
+  constexpr int kMostAspect = 2;
+  constexpr double kLeastFilled = 0.45;  // of the box round it; a disc has 0.79, a square on its corner 0.5
+  const int width = blob.right - blob.left + 1;
+  const int height = blob.bottom - blob.top + 1;
+  return std::max(width, height) <= kMostAspect * std::min(width, height) + 1 &&
+         blob.area_px >= kLeastFilled * width * height;
+}
+
 FrameLight marker_brightness(const cv::Mat& image, cv::Mat& brightness) {
   if (image.empty()) fail("markers: the picture is empty");
   if (image.type() != CV_8UC1 && image.type() != CV_8UC3) {
@@ -75,7 +84,11 @@ const std::vector<MarkerBlob>& MarkerFinder::find(const cv::Mat& image) {
   last_label_ = 0;
   make_room(image);
   if (light_ != FrameLight::kNormal) return blobs_;
-  mark_pixels();
+  if (appearance_.polarity == MarkerPolarity::kDark) {
+    mark_dark_pixels();
+  } else {
+    mark_bright_pixels();
+  }
   for (int y = 0; y < height_; ++y) {
     for (int x = 0; x < width_; ++x) {
       if (label_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)] != -1) {
@@ -95,16 +108,38 @@ void MarkerFinder::make_room(const cv::Mat& image) {
   label_.resize(pixels);
   stack_.resize(pixels);
   column_sum_.resize(static_cast<std::size_t>(width_));
+  limit_.resize(static_cast<std::size_t>(width_));
 }
 
-void MarkerFinder::mark_pixels() {
+void MarkerFinder::mark_dark_pixels() {
+  gel_.read(brightness_, appearance_.diameter_px);
+  const auto darkness = static_cast<float>(appearance_.darkness);
+  const auto least_difference = static_cast<float>(appearance_.least_difference);
+  for (int y = 0; y < height_; ++y) {
+    if (y % gel_.block_px() == 0) {
+      const std::uint8_t* gel = gel_.row(y);
+      for (int x = 0; x < width_; ++gel) {
+        // What is dark is below both; a whole number is if it's below the next whole one.
+        const float most = std::min(darkness * *gel, *gel - least_difference);
+        const auto limit = static_cast<std::uint8_t>(std::ceil(std::max(most, 0.0f)));
+        for (const int end = std::min(x + gel_.block_px(), width_); x < end; ++x)
+          limit_[static_cast<std::size_t>(x)] = limit;
+      }
+    }
+    const std::uint8_t* row = brightness_.ptr<std::uint8_t>(y);
+    std::int32_t* label = label_.data() + static_cast<std::ptrdiff_t>(y) * static_cast<std::ptrdiff_t>(width_);
+    const std::uint8_t* limit = limit_.data();
+    for (int x = 0; x < width_; ++x) label[x] = row[x] < limit[x] ? -1 : 0;
+  }
+}
+
+void MarkerFinder::mark_bright_pixels() {
   // The window's mean by running sums: of columns over rows, then of those along the row.
   const int reach = static_cast<int>(std::lround(0.75 * appearance_.spacing_px));
   const auto add_row = [&](int y, int sign) {
     const std::uint8_t* row = brightness_.ptr<std::uint8_t>(y);
     for (int x = 0; x < width_; ++x) column_sum_[static_cast<std::size_t>(x)] += sign * row[x];
   };
-  const bool is_dark = appearance_.polarity == MarkerPolarity::kDark;
   const auto darkness = static_cast<float>(appearance_.darkness);
   const auto least_difference = static_cast<float>(appearance_.least_difference);
   std::fill(column_sum_.begin(), column_sum_.end(), 0);
@@ -123,9 +158,7 @@ void MarkerFinder::mark_pixels() {
       const int columns = std::min(x + reach, width_ - 1) - std::max(x - reach, 0) + 1;
       const float mean = static_cast<float>(window) / static_cast<float>(rows * columns);
       const float value = row[x];
-      const float dark = is_dark ? value : mean;
-      const float bright = is_dark ? mean : value;
-      label[x] = dark < darkness * bright && bright - dark >= least_difference ? -1 : 0;
+      label[x] = mean < darkness * value && value - mean >= least_difference ? -1 : 0;
     }
   }
 }

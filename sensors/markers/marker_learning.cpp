@@ -11,23 +11,24 @@
 #include <vector>
 
 #include "core/error.h"
+#include "sensors/markers/gel_brightness.h"
 
 namespace touchstone::sensors {
 
 namespace {
 
-constexpr int kMostSide_px = 1000;         ///< a larger picture is halved: markers in it are large, too
-constexpr double kLightFloor = 6.0;        ///< grey levels added before the logarithm: below them is noise
-constexpr double kFirstSigma_px = 0.9;     ///< of a spot 2.5 px wide
+constexpr int kMostSide_px = 1000;      ///< a larger picture is halved: markers in it are large, too
+constexpr double kLightFloor = 6.0;     ///< grey levels added before the logarithm: below them is noise
+constexpr double kFirstSigma_px = 0.9;  ///< of a spot 2.5 px wide
 constexpr int kStepsPerOctave = 4;
 constexpr int kBlurs = kStepsPerOctave + 3;
-constexpr int kLeastSide_px = 24;          ///< of the smallest octave: a spot and what is round it
+constexpr int kLeastSide_px = 24;  ///< of the smallest octave: a spot and what is round it
 /// Of a spot some 7 % darker or brighter than the gel. Real frames without markers (a GelSight Mini's, a 9DTact's) stay
 /// below 0.035; the faint dots of a calibration board under a 9DTact have 0.06.
 constexpr double kLeastResponse = 0.05;
-constexpr double kMostElongation = 3.0;    ///< ratio of the curvatures: an edge or a scratch has a larger one
-constexpr double kSizeSpread = 1.35;       ///< spots of one kind, up and down
-constexpr double kContrastSpread = 0.4;    ///< of a kind's usual response; weaker ones aren't of it
+constexpr double kMostElongation = 3.0;  ///< ratio of the curvatures: an edge or a scratch has a larger one
+constexpr double kSizeSpread = 1.35;     ///< spots of one kind, up and down
+constexpr double kContrastSpread = 0.4;  ///< of a kind's usual response; weaker ones aren't of it
 constexpr double kDiameterPerSigma = 2.0 * std::numbers::sqrt2;  ///< of the disc that a sigma answers to most
 
 /// A place where something round stands out.
@@ -47,11 +48,16 @@ double median(std::vector<double> values) {
 /// Whether |value| is larger than that of the 26 neighbours in place and size, with its sign.
 bool is_extreme(const std::array<cv::Mat, kBlurs - 1>& responses, int level, int x, int y, float value) {
   const float sign = value > 0.0f ? 1.0f : -1.0f;
+  bool before = true;  // of equals the first one is it
   for (int i = level - 1; i <= level + 1; ++i) {
     for (int v = y - 1; v <= y + 1; ++v) {
       const float* row = responses[static_cast<std::size_t>(i)].ptr<float>(v);
       for (int u = x - 1; u <= x + 1; ++u) {
-        if ((i != level || v != y || u != x) && sign * row[u] >= sign * value) return false;
+        if (i == level && v == y && u == x) {
+          before = false;
+        } else if (sign * row[u] > sign * value || (before && row[u] == value)) {
+          return false;
+        }
       }
     }
   }
@@ -121,10 +127,37 @@ std::vector<Spot> find_spots(const cv::Mat& brightness, double scale) {
   return spots;
 }
 
-/// Of spots alike in size and contrast, those with the most contrast together.
-std::vector<Spot> strongest_kind(const std::vector<Spot>& spots) {
-  std::vector<Spot> best;
-  double most = 0.0;
+/// Spots alike in size and contrast.
+struct Kind {
+  std::vector<Spot> spots;
+  double evidence = 0.0;
+};
+
+/// Of one sign, those of about this size. None if there are fewer than kLeastMarkers.
+Kind kind_of(const std::vector<Spot>& spots, MarkerPolarity polarity, double size_px) {
+  Kind kind;
+  std::vector<double> responses;
+  for (const Spot& spot : spots) {
+    const bool alike = spot.diameter_px <= kSizeSpread * size_px && spot.diameter_px * kSizeSpread >= size_px;
+    if (spot.polarity != polarity || !alike) continue;
+    kind.spots.push_back(spot);
+    responses.push_back(spot.response);
+  }
+  // The usual response is that of the upper quarter: noise may give more spots than there are markers.
+  const auto quarter = responses.begin() + static_cast<std::ptrdiff_t>(responses.size() * 3 / 4);
+  std::nth_element(responses.begin(), quarter, responses.end());
+  const double least = kContrastSpread * *quarter;
+  std::erase_if(kind.spots, [&](const Spot& spot) { return spot.response < least; });
+  if (static_cast<int>(kind.spots.size()) < kLeastMarkers) kind.spots.clear();
+  // Squares: a thousand specks of noise have less together than a hundred markers. Times the size: a few dark grains of
+  // dust have less than faint dots, whose many pixels say the same.
+  for (const Spot& spot : kind.spots) kind.evidence += spot.response * spot.response * spot.diameter_px;
+  return kind;
+}
+
+/// The most evident one comes first.
+std::vector<Kind> kinds_of(const std::vector<Spot>& spots) {
+  std::vector<Kind> kinds;
   for (const MarkerPolarity polarity : {MarkerPolarity::kDark, MarkerPolarity::kBright}) {
     std::vector<double> sizes;
     for (const Spot& spot : spots) {
@@ -133,29 +166,12 @@ std::vector<Spot> strongest_kind(const std::vector<Spot>& spots) {
     std::sort(sizes.begin(), sizes.end());
     sizes.erase(std::unique(sizes.begin(), sizes.end()), sizes.end());  // there are few: one for each blur
     for (const double size : sizes) {
-      std::vector<Spot> kind;
-      std::vector<double> responses;
-      for (const Spot& spot : spots) {
-        const bool alike = spot.diameter_px <= kSizeSpread * size && spot.diameter_px * kSizeSpread >= size;
-        if (spot.polarity != polarity || !alike) continue;
-        kind.push_back(spot);
-        responses.push_back(spot.response);
-      }
-      // The usual response is that of the upper quarter: noise may give more spots than there are markers.
-      const auto quarter = responses.begin() + static_cast<std::ptrdiff_t>(responses.size() * 3 / 4);
-      std::nth_element(responses.begin(), quarter, responses.end());
-      const double least = kContrastSpread * *quarter;
-      std::erase_if(kind, [&](const Spot& spot) { return spot.response < least; });
-      // Squares: a thousand specks of noise have less together than a hundred markers.
-      double sum = 0.0;
-      for (const Spot& spot : kind) sum += spot.response * spot.response;
-      if (static_cast<int>(kind.size()) >= kLeastMarkers && sum > most) {
-        most = sum;
-        best = std::move(kind);
-      }
+      Kind kind = kind_of(spots, polarity, size);
+      if (!kind.spots.empty()) kinds.push_back(std::move(kind));
     }
   }
-  return best;
+  std::stable_sort(kinds.begin(), kinds.end(), [](const Kind& a, const Kind& b) { return a.evidence > b.evidence; });
+  return kinds;
 }
 
 double median_to_nearest(const std::vector<Spot>& spots) {
@@ -182,26 +198,63 @@ double mean_round(const cv::Mat& sums, const Eigen::Vector2d& place_px, double r
   return sum / (static_cast<double>(right - left) * (bottom - top));
 }
 
-/// The threshold half way between the markers and the mean of MarkerFinder's window round them.
+/// The threshold half way between the markers and what MarkerFinder compares them with.
 void set_threshold(const std::vector<Spot>& kind, const cv::Mat& brightness, MarkerAppearance& appearance) {
-  constexpr double kCore = 0.2;                ///< of the diameter, to each side: a marker without its rim
-  constexpr double kPartOfDifference = 0.3;    ///< so many grey levels a blob needs at least, of a faint marker's
-  constexpr double kFaint = 0.1;               ///< quantile
-  constexpr double kLeast = 2.0, kMost = 10.0; ///< grey levels: noise, and what any marker has
+  constexpr double kCore = 0.2;                 ///< of the diameter, to each side: a marker without its rim
+  constexpr double kPartOfDifference = 0.3;     ///< so many grey levels a blob needs at least, of a faint marker's
+  constexpr double kFaint = 0.1;                ///< quantile
+  constexpr double kLeast = 2.0, kMost = 10.0;  ///< grey levels: noise, and what any marker has
   cv::Mat sums;
   cv::integral(brightness, sums, CV_64F);
+  const bool is_dark = appearance.polarity == MarkerPolarity::kDark;
+  GelBrightness gel;
+  if (is_dark) gel.read(brightness, appearance.diameter_px);
   std::vector<double> ratios, differences;
   for (const Spot& spot : kind) {
     const double core = mean_round(sums, spot.place_px, kCore * appearance.diameter_px);
-    const double window = mean_round(sums, spot.place_px, 0.75 * appearance.spacing_px);
-    const auto [low, high] = std::minmax(core, window);
+    double other = 0.0;
+    if (is_dark) {
+      const int x = std::clamp(static_cast<int>(spot.place_px.x()), 0, brightness.cols - 1);
+      const int y = std::clamp(static_cast<int>(spot.place_px.y()), 0, brightness.rows - 1);
+      other = gel.row(y)[x / gel.block_px()];
+    } else {
+      other = mean_round(sums, spot.place_px, 0.75 * appearance.spacing_px);
+    }
+    const auto [low, high] = std::minmax(core, other);
     ratios.push_back(high > 0.0 ? low / high : 1.0);
     differences.push_back(high - low);
   }
   appearance.darkness = std::clamp(0.5 * (1.0 + median(ratios)), 0.1, 0.99);
-  const auto faint = differences.begin() + static_cast<std::ptrdiff_t>(kFaint * static_cast<double>(differences.size()));
+  const auto faint =
+      differences.begin() + static_cast<std::ptrdiff_t>(kFaint * static_cast<double>(differences.size()));
   std::nth_element(differences.begin(), faint, differences.end());
   appearance.least_difference = std::clamp(kPartOfDifference * *faint, kLeast, kMost);
+}
+
+MarkerAppearance appearance_of(const std::vector<Spot>& kind, const cv::Mat& brightness) {
+  MarkerAppearance appearance;
+  appearance.polarity = kind.front().polarity;
+  std::vector<double> sizes;
+  for (const Spot& spot : kind) sizes.push_back(spot.diameter_px);
+  appearance.diameter_px = std::clamp(median(std::move(sizes)), 2.0, 256.0);
+  appearance.spacing_px = std::clamp(median_to_nearest(kind), appearance.diameter_px, 1024.0);
+  set_threshold(kind, brightness, appearance);
+  return appearance;
+}
+
+/// Whether most spots are blobs, too. The four corners of a gel before a black housing are spots, but no blobs.
+bool is_confirmed(const std::vector<Spot>& kind, const cv::Mat& brightness, const MarkerAppearance& appearance) {
+  constexpr double kLeastBlobs = 0.5;  // of the spots
+  constexpr double kAreaSpread = 3.0;  // of a disc of the diameter, which is known to a step of size only
+  if (std::min(brightness.rows, brightness.cols) < appearance.spacing_px) return false;
+  MarkerFinder finder(appearance);
+  const double disc_px = 0.25 * std::numbers::pi * appearance.diameter_px * appearance.diameter_px;
+  int blobs = 0;
+  for (const MarkerBlob& blob : finder.find(brightness)) {
+    const bool alike = blob.area_px <= kAreaSpread * disc_px && blob.area_px * kAreaSpread >= disc_px;
+    blobs += alike && !blob.at_border && is_compact(blob) ? 1 : 0;
+  }
+  return blobs >= kLeastMarkers && blobs >= kLeastBlobs * static_cast<double>(kind.size());
 }
 
 }  // namespace
@@ -218,18 +271,11 @@ MarkerAppearance learn_appearance(const cv::Mat& rest) {
     small = half;
     scale *= 2.0;
   }
-  const std::vector<Spot> kind = strongest_kind(find_spots(small, scale));
-  if (kind.empty()) {
-    fail("markers: the frame at rest shows none: no {} spots of one size stand out in it", kLeastMarkers);
+  for (const Kind& kind : kinds_of(find_spots(small, scale))) {
+    const MarkerAppearance appearance = appearance_of(kind.spots, brightness);
+    if (is_confirmed(kind.spots, brightness, appearance)) return appearance;
   }
-  MarkerAppearance appearance;
-  appearance.polarity = kind.front().polarity;
-  std::vector<double> sizes;
-  for (const Spot& spot : kind) sizes.push_back(spot.diameter_px);
-  appearance.diameter_px = std::clamp(median(std::move(sizes)), 2.0, 256.0);
-  appearance.spacing_px = std::clamp(median_to_nearest(kind), appearance.diameter_px, 1024.0);
-  set_threshold(kind, brightness, appearance);
-  return appearance;
+  fail("markers: the frame at rest shows none: no {} spots of one size stand out in it", kLeastMarkers);
 }
 
 }  // namespace touchstone::sensors

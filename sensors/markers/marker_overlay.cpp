@@ -10,8 +10,8 @@ namespace touchstone::sensors {
 
 namespace {
 
-constexpr int kShift = 4;         // fractional bits of OpenCV's drawing coordinates
-constexpr double kRing = 0.65;    // of a marker's diameter: just outside its rim
+constexpr int kShift = 4;            // fractional bits of OpenCV's drawing coordinates
+constexpr double kRing = 0.65;       // of a marker's diameter: just outside its rim
 constexpr double kLeastArrow = 0.5;  // px: a shorter one is noise
 const cv::Scalar kTrusted(60, 220, 60);
 const cv::Scalar kHeld(40, 40, 230);

@@ -14,12 +14,13 @@ namespace {
 
 constexpr double kNeighbourReach = 1.6;  ///< of the spacing: the eight round a marker of a square grid
 constexpr double kAreaLearning = 0.05;   ///< how fast a marker's usual area follows the measured one, a frame
+constexpr double kRestSpread = 2.5;      ///< of markers' areas at rest, up and down
 constexpr double kAtRest = 0.1;          ///< of the spacing
 constexpr std::size_t kLeastNeighbours = 3, kMostNeighbours = 12;
-constexpr double kFarthest = 1.5;   ///< of the median spacing: a marker that stands alone isn't searched for farther off
-constexpr double kStray = 0.6;      ///< of the distance to the nearest neighbour: off the median of the neighbours' motion
+constexpr double kFarthest = 1.5;  ///< of the median spacing: a marker that stands alone isn't searched for farther off
+constexpr double kStray = 0.6;  ///< of the distance to the nearest neighbour: off the median of the neighbours' motion
 constexpr double kClearlyLess = 0.7;  ///< of the misfit: only then markers are expected to go on as they went
-constexpr double kMostSteps = 4.0;  ///< of the last step, where frames were dropped
+constexpr double kMostSteps = 4.0;    ///< of the last step, where frames were dropped
 
 /// The nearest of `places` to `from`, -1 if there's none.
 template <typename Places, typename PlaceOf>
@@ -74,8 +75,7 @@ int TrackedMarkers::found() const {
   return static_cast<int>(std::count_if(status.begin(), status.end(), [](MarkerStatus one) { return is_found(one); }));
 }
 
-MarkerTracker::MarkerTracker(const MarkerTrackerSettings& settings)
-    : settings_(settings) {
+MarkerTracker::MarkerTracker(const MarkerTrackerSettings& settings) : settings_(settings) {
   if (settings.appearance) MarkerFinder{*settings.appearance};  // which checks it
   if (!(settings.longest_step >= 0.05 && settings.longest_step <= 0.5)) {
     fail("marker longest_step is {}, it must be from 0.05 to 0.5 of the spacing", settings.longest_step);
@@ -116,7 +116,7 @@ const TrackedMarkers& MarkerTracker::track(const Frame& frame) {
 }
 
 void MarkerTracker::begin(const std::vector<MarkerBlob>& blobs) {
-  // A blob much larger or smaller than most is none of the markers.
+  // A blob much larger or smaller than most, or a long one, is none of the markers.
   std::vector<int> areas;
   for (const MarkerBlob& blob : blobs) {
     if (!blob.at_border) areas.push_back(blob.area_px);
@@ -132,7 +132,7 @@ void MarkerTracker::begin(const std::vector<MarkerBlob>& blobs) {
   std::vector<int> area_px;
   for (const MarkerBlob& blob : blobs) {
     const bool is_marker =
-        blob.area_px <= settings_.max_area_change * usual && blob.area_px * settings_.max_area_change >= usual;
+        blob.area_px <= kRestSpread * usual && blob.area_px * kRestSpread >= usual && is_compact(blob);
     if (blob.at_border || !is_marker) continue;
     rest.push_back(blob.centroid);
     usual_area.push_back(blob.area_px);
@@ -236,8 +236,7 @@ void MarkerTracker::predict(const std::vector<MarkerBlob>& blobs, std::int64_t t
     }
   }
   for (std::size_t i = 0; i < expected_.size(); ++i) {
-    expected_[i] =
-        (is_found(result_.status[i]) ? result_.positions[i] : carried_by_neighbours(i)) + steps * step_[i];
+    expected_[i] = (is_found(result_.status[i]) ? result_.positions[i] : carried_by_neighbours(i)) + steps * step_[i];
   }
 }
 

@@ -7,7 +7,8 @@
 //   distance to the marker's neighbour. So no two markers share a blob, and a step that could lead to the neighbour's
 //   place is no match: it's reported.
 // - Markers are expected where they were, or as far on as their last step took them, whichever the blobs of all of them
-//   fit better: a gel that is dragged at half a spacing a frame is followed, and so is one of which a frame was dropped.
+//   fit better: a gel that is dragged at half a spacing a frame is followed, and so is one of which a frame was
+//   dropped.
 // - A marker that isn't measured is held where its neighbours' mean displacement carries it, and looked for there.
 // - A gel is continuous: a marker that has left its neighbours by more than `kStray` of the way to them has another
 //   marker's blob, or a speck of something. It's reported and held.
@@ -31,8 +32,8 @@ namespace touchstone::sensors {
 /// What markers look like, how far they may go between frames, and how much their area may change.
 struct MarkerTrackerSettings {
   std::optional<MarkerAppearance> appearance = {};  ///< none: it's learnt from the frame at rest
-  /// How far from where it is expected a marker may be found, as a part of the distance to its nearest neighbour at rest
-  /// (of which no more counts than 1.5 median ones); 0.05 to 0.5
+  /// How far from where it is expected a marker may be found, as a part of the distance to its nearest neighbour at
+  /// rest (of which no more counts than 1.5 median ones); 0.05 to 0.5
   double longest_step = 0.4;
   double max_area_change = 1.8;  ///< up or down, against the marker's own usual area; above 1
 };
@@ -80,8 +81,8 @@ class MarkerTracker {
   /// Looks at the next frame; the first one is the gel at rest. The result is valid until the next call.
   /// A later frame without light (dark, saturated, flat) has no marker found, and all of them held.
   /// @throws Error as MarkerFinder::find; for a first frame without light, in which none stand out, or with fewer whole
-  /// markers than kLeastMarkers; for a time that isn't later than the last frame's. The tracker is then as it was before
-  /// the call
+  /// markers than kLeastMarkers; for a time that isn't later than the last frame's. The tracker is then as it was
+  /// before the call
   const TrackedMarkers& track(const Frame& frame);
 
   /// What the last call of track() returned; empty before the first.
@@ -118,11 +119,11 @@ class MarkerTracker {
   TrackedMarkers result_;
   double spacing_px_ = 0.0;
   std::vector<double> usual_area_;
-  std::vector<double> distance_px_;   ///< to each marker's nearest neighbour at rest, at most 1.5 spacings
-  std::vector<int> neighbour_begin_;  ///< into neighbours_; one more than markers
-  std::vector<int> neighbours_;       ///< at rest, within 1.6 spacings, and at least the nearest three
-  std::vector<Eigen::Vector2d> before_;  ///< positions in the last frame with light
-  std::vector<Eigen::Vector2d> step_;    ///< from the one before that
+  std::vector<double> distance_px_;       ///< to each marker's nearest neighbour at rest, at most 1.5 spacings
+  std::vector<int> neighbour_begin_;      ///< into neighbours_; one more than markers
+  std::vector<int> neighbours_;           ///< at rest, within 1.6 spacings, and at least the nearest three
+  std::vector<Eigen::Vector2d> before_;   ///< positions in the last frame with light
+  std::vector<Eigen::Vector2d> step_;     ///< from the one before that
   double seen_us_ = 0.0, step_us_ = 0.0;  ///< when the last frame with light was, and how long the step took
   std::vector<int> strays_;
   std::vector<Eigen::Vector2d> expected_;

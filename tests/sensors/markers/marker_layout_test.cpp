@@ -1,5 +1,6 @@
 // Markers in any layout, of which nothing is known but a picture: painted pictures, whose positions are known.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <numbers>
@@ -40,12 +41,14 @@ Places rings(int count, double pitch_px) {
   return places;
 }
 
-/// In no order, none nearer to another than `least_px`.
-Places scattered(int count, double least_px) {
+/// In no order, none nearer to another than `least_px`, none so near to the edge that it is cut.
+Places scattered(int count, double least_px, double diameter_px = 30.0) {
+  const double edge = 0.6 * diameter_px + 2.0;
   RandomStream random(11, 0, Purpose::kTest);
   Places places;
   while (static_cast<int>(places.size()) < count) {
-    const Eigen::Vector2d place(20.0 + 600.0 * random.uniform(), 20.0 + 440.0 * random.uniform());
+    const Eigen::Vector2d place(edge + (639.0 - 2.0 * edge) * random.uniform(),
+                                edge + (479.0 - 2.0 * edge) * random.uniform());
     const bool is_free = std::all_of(places.begin(), places.end(),
                                      [&](const Eigen::Vector2d& other) { return (other - place).norm() >= least_px; });
     if (is_free) places.push_back(place);
@@ -69,7 +72,12 @@ Places dragged(Places places, const Eigen::Vector2d& motion, double reach_px = 1
 }
 
 MarkerPicture uneven_light(double diameter_px) {
-  return {.width = 640, .height = 480, .diameter_px = diameter_px, .blur_px = 0.8, .shading = 0.35, .vignette = 0.6,
+  return {.width = 640,
+          .height = 480,
+          .diameter_px = diameter_px,
+          .blur_px = 0.8,
+          .shading = 0.35,
+          .vignette = 0.6,
           .noise = 2.0};
 }
 
@@ -165,6 +173,35 @@ TEST(MarkerLayout, EachMarkerOfAnyLayoutIsFoundAndNothingElse) {
       EXPECT_EQ(appearance.polarity, one.picture.marker > 1.0 ? MarkerPolarity::kBright : MarkerPolarity::kDark);
       EXPECT_NEAR(appearance.diameter_px, one.picture.diameter_px, 0.25 * one.picture.diameter_px);
     }
+  }
+}
+
+TEST(MarkerLayout, RandomPicturesAreReadToo) {
+  // Sizes, distances, contrast, light and noise drawn at random: nothing is tuned to the cases above.
+  RandomStream random(21, 0, Purpose::kTest);
+  const auto between = [&](double low, double high) { return low + (high - low) * random.uniform(); };
+  for (int i = 0; i < 40; ++i) {
+    const double pitch_px = between(14.0, 110.0);
+    const double diameter_px = std::max(pitch_px * between(0.18, 0.55), 3.5);
+    const bool bright = i % 3 == 0;
+    MarkerPicture picture = {.width = 640, .height = 480, .diameter_px = diameter_px, .blur_px = between(0.5, 1.2)};
+    picture.shading = between(0.0, 0.4);
+    picture.vignette = between(0.0, 0.7);
+    picture.noise = between(0.0, 3.0);
+    picture.brightness = bright ? between(5.0, 30.0) : between(60.0, 220.0);
+    picture.marker = bright ? between(4.0, 8.0) : between(0.02, 0.7);
+    const Places rest =
+        i % 2 == 0 ? off_grid(rows(std::max(static_cast<int>((560.0 - diameter_px) / pitch_px), 2),
+                                   std::max(static_cast<int>((400.0 - diameter_px) / pitch_px), 2), pitch_px))
+                   : off_grid(scattered(std::min(static_cast<int>(0.4 * 600 * 440 / (pitch_px * pitch_px)), 150),
+                                        pitch_px, diameter_px));
+    SCOPED_TRACE(fmt::format("picture {}: {} markers of {:.1f} px, {:.1f} px apart, bright {}, marker {:.2f}", i,
+                             rest.size(), diameter_px, pitch_px, bright, picture.marker));
+    MarkerTracker tracker({});
+    const TrackedMarkers& markers = tracker.track({paint_markers(picture, rest, static_cast<std::uint64_t>(1 + i)), 0});
+    ASSERT_EQ(markers.rest.size(), rest.size());
+    numbers_of(markers, rest);
+    EXPECT_EQ(tracker.appearance()->polarity, bright ? MarkerPolarity::kBright : MarkerPolarity::kDark);
   }
 }
 
@@ -264,6 +301,27 @@ TEST(MarkerLayout, AFaintPrintIsFound) {
   const TrackedMarkers& markers = tracker.track({paint_markers(picture, rest), 0});
   ASSERT_EQ(markers.rest.size(), rest.size());
   numbers_of(markers, rest);
+}
+
+TEST(MarkerLayout, AHousingDustAndAHighlightInViewAreNoMarkers) {
+  const Places rest = off_grid(rows(9, 7, 52.0));
+  MarkerPicture picture = uneven_light(16.0);
+  picture.marker = 0.5;
+  for (const bool with_corners : {false, true}) {
+    cv::Mat image = paint_markers(picture, rest);
+    const cv::Rect gel = with_corners ? cv::Rect(80, 60, 490, 365) : cv::Rect(80, 0, 490, 480);
+    cv::Mat housing(image.size(), CV_8UC3, cv::Scalar::all(5));
+    image(gel).copyTo(housing(gel));
+    for (const cv::Point place : {cv::Point(140, 110), {300, 214}, {400, 310}}) {
+      cv::circle(housing, place, 2, cv::Scalar::all(30), cv::FILLED, cv::LINE_AA);
+    }
+    cv::circle(housing, {242, 318}, 9, cv::Scalar::all(255), cv::FILLED, cv::LINE_AA);
+    MarkerTracker tracker({});
+    const TrackedMarkers& markers = tracker.track({as_jpeg(housing, 85), 0});
+    ASSERT_EQ(markers.rest.size(), rest.size());
+    const auto numbers = numbers_of(markers, rest);
+    for (std::size_t i = 0; i < rest.size(); ++i) EXPECT_LT((markers.rest[numbers[i]] - rest[i]).norm(), 1.0);
+  }
 }
 
 TEST(MarkerLayout, ALargePictureIsLearntFromASmallerOne) {

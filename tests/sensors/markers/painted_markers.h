@@ -17,15 +17,15 @@ struct MarkerPicture {
   int width = 320;
   int height = 240;
   double diameter_px = 7.5;
-  double blur_px = 0.7;       ///< standard deviation of the rim's blur
+  double blur_px = 0.7;          ///< standard deviation of the rim's blur
   double diameter_spread = 0.0;  ///< each marker's diameter is changed by up to this part
-  double marker = 0.08;       ///< albedo of a marker against the membrane's; above 1: bright markers
-  double brightness = 150.0;  ///< in the middle, grey levels
-  double shading = 0.3;       ///< how much a channel falls off over the picture's half width
-  double vignette = 0.0;      ///< how much darker the corners are
-  double noise = 0.0;         ///< standard deviation, grey levels
-  cv::Rect shadow = {};       ///< where the membrane has only
-  double shadow_light = 0.4;  ///< this part of its light
+  double marker = 0.08;          ///< albedo of a marker against the membrane's; above 1: bright markers
+  double brightness = 150.0;     ///< in the middle, grey levels
+  double shading = 0.3;          ///< how much a channel falls off over the picture's half width
+  double vignette = 0.0;         ///< how much darker the corners are
+  double noise = 0.0;            ///< standard deviation, grey levels
+  cv::Rect shadow = {};          ///< where the membrane has only
+  double shadow_light = 0.4;     ///< this part of its light
 };
 
 /// A grid of markers in rows, as far as whole ones fit with some distance from the edge.
