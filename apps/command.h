@@ -53,6 +53,7 @@ void add_vhs_calibration(CLI::App& calibrations, const GlobalOptions& global, Ac
 void add_gelsight_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
 void add_9dtact_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
 void add_chroma_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
+void add_markers_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
 void add_vhs_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
 void add_gelsight_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
 
