@@ -18,6 +18,7 @@ void bind_session(py::module_& module);
 void bind_gelsight(py::module_& module);
 void bind_dtact(py::module_& module);
 void bind_vhs(py::module_& module);
+void bind_markers(py::module_& module);
 void bind_chroma(py::module_& module);
 
 }  // namespace touchstone::python

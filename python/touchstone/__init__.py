@@ -40,6 +40,7 @@ from ._core import (
     HueEstimator,
     HueField,
     HueModel,
+    MarkerTracker,
     Object,
     Reading,
     Sensor,
@@ -47,6 +48,7 @@ from ._core import (
     StiffnessForceModel,
     Touch,
     TrackedBeads,
+    TrackedMarkers,
     calibrate_darkness,
     calibrate_height,
     calibrate_hue,
@@ -110,7 +112,7 @@ def merge(job, out, *, progress=None):
 __all__ = [
     "BeadTracker", "ColourMarkerReader", "ColourMarkerReading", "DarknessEstimator", "DarknessModel", "DarknessResult",
     "Dataset", "Error", "ForceEstimate", "HeightEstimator", "HeightModel", "HeightResult", "HueEstimator", "HueField",
-    "HueModel", "Object", "Reading", "Sensor", "Session", "StiffnessForceModel", "Touch", "TrackedBeads",
-    "calibrate_darkness", "calibrate_height", "calibrate_hue", "generate", "merge", "read_image", "scenes_folder",
-    "train_stiffness", "write_png",
+    "HueModel", "MarkerTracker", "Object", "Reading", "Sensor", "Session", "StiffnessForceModel", "Touch",
+    "TrackedBeads", "TrackedMarkers", "calibrate_darkness", "calibrate_height", "calibrate_hue", "generate", "merge",
+    "read_image", "scenes_folder", "train_stiffness", "write_png",
 ]

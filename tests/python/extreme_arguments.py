@@ -255,6 +255,10 @@ def beads_picture(places=REST, size=(240, 320), radius=8.0):
     return np.round(200 - 150 * cover).astype(np.uint8)
 
 
+def dots_picture():
+    return beads_picture([(60 + 25 * i, 40 + 25 * j) for j in range(6) for i in range(8)], radius=5.0)
+
+
 def markers_picture(shift=(0.0, 0.0), side=16.0, spacing=40.0, grid=4):
     """As test_estimators.py has it."""
     size = int(spacing * (grid + 1.5))
@@ -554,6 +558,12 @@ def table(t):
             Call(lambda: ts.BeadTracker(roi_a_px=200).track, {
                 "frame": (beads_picture(), pictures), "t_us": (0, numbers)})],
         "BeadTracker.restart": lambda: [Call(lambda: t.tracker().restart)],
+        "MarkerTracker": lambda: [Call(lambda: ts.MarkerTracker, {"rest": (dots_picture(), pictures)},
+                                       after=lambda tracker: tracker.track(dots_picture()) and None)],
+        "MarkerTracker.track": lambda: [Call(lambda: ts.MarkerTracker(dots_picture()).track, {
+            "frame": (dots_picture(), pictures), "t_us": (1000, numbers)})],
+        "MarkerTracker.restart": lambda: [Call(lambda: ts.MarkerTracker(dots_picture()).restart, {
+            "rest": (dots_picture(), pictures)})],
         "StiffnessForceModel.load": lambda: [Call(lambda: ts.StiffnessForceModel.load,
                                                   {"path": (t.stiffness_file, paths)})],
         "StiffnessForceModel.save": lambda: [Call(lambda: t.stiffness.save, {"path": ("y", paths)})],

@@ -64,6 +64,85 @@ def test_settings_out_of_range_name_themselves():
         ts.BeadTracker(grid=1)
 
 
+def dots_picture(places, polarity="dark", size=(240, 320), radius=5.0):
+    """Dots under light that falls off to the corners, antialiased."""
+    rows, columns = np.mgrid[:size[0], :size[1]] + 0.5
+    cover = np.zeros(size)
+    for x, y in places:
+        cover = np.maximum(cover, np.clip(radius + 0.5 - np.hypot(columns - x, rows - y), 0, 1))
+    light = 1 - 0.4 * np.hypot((columns - 160) / 200, (rows - 120) / 200) ** 2
+    levels = 190 - 170 * cover if polarity == "dark" else 10 + 180 * cover
+    return np.round(light * levels).astype(np.uint8)
+
+
+NINE_BY_NINE = np.array([(50.3 + 27 * i, 12.2 + 27 * j) for j in range(9) for i in range(9)])
+RINGS = np.array([(160.4, 120.6)] + [(160.4 + 25 * k * np.cos(a), 120.6 + 25 * k * np.sin(a)) for k in (1, 2, 3, 4)
+                                     for a in np.arange(6 * k) * np.pi / 3 / k])
+
+
+@pytest.mark.parametrize("polarity", ["dark", "bright"])
+@pytest.mark.parametrize("places", [NINE_BY_NINE, RINGS], ids=["nine by nine", "rings"])
+def test_markers_of_any_layout_are_followed(places, polarity):
+    tracker = ts.MarkerTracker(dots_picture(places, polarity))
+    assert tracker.polarity == polarity and tracker.rest_px.shape == places.shape
+    apart = np.linalg.norm(places[:, None] - places[None], axis=2) + 1e9 * np.eye(len(places))
+    assert abs(tracker.diameter_px - 10) < 2.5 and abs(tracker.spacing_px - np.median(apart.min(axis=1))) < 0.5
+    number = np.array([np.linalg.norm(tracker.rest_px - place, axis=1).argmin() for place in places])
+    assert len(set(number)) == len(places)
+    for k in range(1, 6):  # in all more than half of what lies between two
+        moved = places + 3.5 * k * np.exp(-((places - (160, 120)) ** 2).sum(axis=1) / 8000)[:, None] * (0.8, -0.6)
+        seen = tracker.track(dots_picture(moved, polarity))
+        assert seen.trusted.all() and seen.found == len(places) and not seen.jumped and seen.light == "normal"
+        error = seen.displacement_px[number] - (moved - places)
+        assert np.sqrt((error ** 2).sum(axis=1).mean()) < 0.1
+    assert seen.trusted.dtype == bool and set(seen.status) == {"found"}
+    assert np.allclose(seen.positions_px - seen.rest_px, seen.displacement_px)
+
+    hidden = 40 if len(places) == 81 else 10
+    without = tracker.track(dots_picture(np.delete(moved, hidden, axis=0), polarity))
+    assert not without.trusted[number[hidden]] and without.trusted.sum() == len(places) - 1
+    assert without.status[number[hidden]] == "hidden"
+    assert np.linalg.norm(without.positions_px[number[hidden]] - moved[hidden]) < 8, "held with its neighbours"
+    assert tracker.track(dots_picture(moved, polarity)).status[number[hidden]] == "found again"
+    dark = tracker.track(np.zeros((240, 320), np.uint8))
+    assert dark.light == "dark" and not dark.trusted.any()
+
+
+def test_a_marker_tracker_keeps_time_and_starts_again():
+    tracker = ts.MarkerTracker(dots_picture(NINE_BY_NINE))
+    times = [tracker.track(dots_picture(NINE_BY_NINE), t).t_us for t in (None, None, 1000, None)]
+    assert times == [0, 1, 1000, 1999]
+    for bad in (1999, -5):
+        with pytest.raises(ts.Error, match="time"):
+            tracker.track(dots_picture(NINE_BY_NINE), bad)
+    for bad in (1.5, "3", 2**64, float("nan")):
+        with pytest.raises(ts.Error, match="^t_us: "):
+            tracker.track(dots_picture(NINE_BY_NINE), bad)
+    tracker.track(dots_picture(NINE_BY_NINE), 2**63 - 1)
+    with pytest.raises(ts.Error, match="^t_us: it must be given"):
+        tracker.track(dots_picture(NINE_BY_NINE))
+    tracker.restart(dots_picture(RINGS))
+    assert len(tracker.rest_px) == len(RINGS) and tracker.track(dots_picture(RINGS)).t_us == 0
+
+
+def test_pictures_without_markers_are_refused_and_change_nothing():
+    good = dots_picture(NINE_BY_NINE)
+    tracker = ts.MarkerTracker(good)
+    for bad, why in ((np.full((240, 320), 255, np.uint8), "saturated"), (np.zeros((240, 320), np.uint8), "dark"),
+                     (dots_picture([]), "shows none"), (dots_picture([(160, 120)]), "shows none"),
+                     (np.full((240, 320), np.nan), "rest"), (good.astype(np.float32), "rest"),
+                     (good.astype(np.uint16), "8 bit"), (np.zeros((0, 3), np.uint8), ""), (None, "rest")):
+        with pytest.raises(ts.Error, match=why):
+            ts.MarkerTracker(bad)
+        with pytest.raises(ts.Error, match=why):
+            tracker.restart(bad)
+    for bad, why in ((good[:100], "320 x 100 px, the first one was 320 x 240"), (np.full((240, 320), np.nan), "frame"),
+                     (np.dstack([good] * 4), "frame")):
+        with pytest.raises(ts.Error, match=why):
+            tracker.track(bad)
+    assert tracker.track(good).trusted.all()
+
+
 def markers_picture(shift=(0.0, 0.0), side=16.0, spacing=40.0, grid=4):
     """Yellow films of 20 px, soft magenta squares seen through them and beside them; rims are antialiased."""
     size = int(spacing * (grid + 1.5))

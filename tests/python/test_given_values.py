@@ -110,7 +110,7 @@ def test_whole_numbers_are_refused_by_name(sensor, ball, examples, tmp_path):
         "roi_a_px": [lambda bad: ts.BeadTracker(roi_a_px=bad)],
         "roi_b_px": [lambda bad: ts.BeadTracker(roi_b_px=bad)],
         "threads": [lambda bad: ts.generate("none.yaml", tmp_path / "out", threads=bad)],
-        "t_us": [lambda bad: ts.BeadTracker().track(picture, bad)],
+        "t_us": [lambda bad: ts.BeadTracker().track(picture, bad)],  # of MarkerTracker None is one: test_estimators.py
     }
     for name, of_name in calls.items():
         for call in of_name:
