@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "sensors/markers/marker_filling.h"
+#include "sensors/markers/marker_overlay.h"
 #include "tests/sensors/markers/painted_markers.h"
 
 namespace touchstone::sensors {
@@ -288,6 +289,44 @@ TEST(MarkerFinder, NoiseEndsAtTheMostBlobs) {
   for (auto& value : cv::Mat_<std::uint8_t>(noise)) value = random.uniform() < 0.1 ? 0 : 200;
   MarkerFinder finder({.diameter_px = 2.0, .spacing_px = 8.0, .least_area = 0.0});
   EXPECT_EQ(finder.find(noise).size(), MarkerFinder::kMostBlobs);
+}
+
+TEST(MarkerOverlay, RingsAreGreenWhereTrustedAndRedWhereHeld) {
+  const auto rest = marker_grid();
+  const std::size_t hidden = 4 * 14 + 7;
+  MarkerTracker tracker({});
+  tracker.track({paint_markers({}, rest), 0});
+  auto now = rest;
+  for (Eigen::Vector2d& place : now) place += Eigen::Vector2d(5.0, 2.0);
+  now[hidden].setConstant(std::nan(""));
+  const cv::Mat frame = paint_markers({}, now);
+  const cv::Mat before = frame.clone();
+  const TrackedMarkers& markers = tracker.track({frame, 1});
+  cv::Mat picture;
+  draw_overlay(frame, markers, *tracker.appearance(), picture);
+  EXPECT_EQ(cv::norm(frame, before, cv::NORM_INF), 0.0) << "the frame itself is drawn upon";
+  const auto drawn = [&](std::size_t place, bool red) {  // pixels of a colour that no frame has
+    const Eigen::Vector2d at = rest[place] + Eigen::Vector2d(5.0, 2.0);
+    int count = 0;
+    for (int y = static_cast<int>(at.y()) - 8; y < static_cast<int>(at.y()) + 8; ++y) {
+      for (int x = static_cast<int>(at.x()) - 8; x < static_cast<int>(at.x()) + 8; ++x) {
+        const cv::Vec3b& pixel = picture.at<cv::Vec3b>(y, x);
+        count += red ? pixel[2] > 200 && pixel[1] < 80 : pixel[1] > 200 && pixel[2] < 120;
+      }
+    }
+    return count;
+  };
+  EXPECT_GT(drawn(hidden, true), 10);
+  EXPECT_EQ(drawn(hidden, false), 0);
+  EXPECT_GT(drawn(hidden + 3, false), 5);
+  EXPECT_EQ(drawn(hidden + 3, true), 0);
+  cv::Mat grey;
+  cv::extractChannel(frame, grey, 1);
+  draw_overlay(grey, markers, *tracker.appearance(), picture);
+  EXPECT_EQ(picture.type(), CV_8UC3);
+  grey.convertTo(grey, CV_32F);
+  EXPECT_THROW(draw_overlay(grey, markers, *tracker.appearance(), picture), Error);
+  EXPECT_THROW(draw_overlay(frame, markers, *tracker.appearance(), picture, {.arrow_scale = 0.0}), Error);
 }
 
 TEST(FillMarkers, AFilledPictureIsOneWithoutMarkers) {
