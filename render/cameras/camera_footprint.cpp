@@ -16,7 +16,7 @@ constexpr int kHoleSide = 16;
 constexpr int kWideHoleSide = 24;
 constexpr double kWide = 8.0;  // pixels
 constexpr int kLensSide = 6;   // the same of a lens where diffraction spreads each of them
-constexpr int kFarCells = 4;   // far from the middle diffraction's cells are so many times as wide
+constexpr int kFarCells = 3;   // far from the middle diffraction's cells are so many times as wide
 
 /// Places in the picture whose central rays meet the surface where the rays through all of the hole do, relative to
 /// the pixel, and what each weighs (in all 1).
@@ -41,8 +41,10 @@ struct Cell {
 };
 
 /// As fine as pixels and diffraction's rings ask for where most of the light is, coarser beyond.
-std::vector<Cell> cells_of(const DiffractionSpread& spread, double pitch_mm) {
-  const double fine = std::min(pitch_mm, spread.ring_mm() / 2.0);
+/// A lens's cells are parts of pixels, which so average over themselves; behind a hole, whose blur is wide, a cell is a
+/// pixel's middle: paths that are shared are drawn over the pixel.
+std::vector<Cell> cells_of(const DiffractionSpread& spread, double pitch_mm, bool is_lens) {
+  const double fine = std::min(is_lens ? pitch_mm / 3.0 : pitch_mm, spread.ring_mm() / 2.0);
   const double coarse = kFarCells * fine;
   const auto half = static_cast<int>(std::ceil(spread.reach_mm() / coarse));
   std::vector<Cell> cells;
@@ -187,8 +189,10 @@ double scale_to_keep_variance(const Spread& spread, int axis, int side) {
   return scale;
 }
 
+/// `whole`: what an offset leads to belongs to one square, not in parts to those that the pixel overlaps there. Offsets
+/// that are finer than pixels then soften the picture by a square and no more.
 CameraFootprint::Kernel kernel_of(const Spread& spread, const Eigen::Vector2d& scale, int phase_x, int phase_y,
-                                  int side) {
+                                  int side, bool whole) {
   const auto offset_of = [&](std::size_t k) -> Eigen::Vector2d {
     return spread.mean + scale.cwiseProduct(spread.offsets[k] - spread.mean);
   };
@@ -199,6 +203,13 @@ CameraFootprint::Kernel kernel_of(const Spread& spread, const Eigen::Vector2d& s
   Eigen::ArrayXXd found = Eigen::ArrayXXd::Zero(2 * reach + 1, 2 * reach + 1);  // by column, row
   for (std::size_t k = 0; k < spread.offsets.size(); ++k) {
     const Eigen::Vector2d offset = offset_of(k);
+    if (whole) {
+      const auto square = [&](int phase, double along) {
+        return static_cast<int>(std::floor((phase + 0.5 + along) / side)) + reach;
+      };
+      found(square(phase_x, offset.x()), square(phase_y, offset.y())) += spread.weights[k];
+      continue;
+    }
     shares(phase_x + 0.5 + offset.x(), side, [&](int column, double across) {
       shares(phase_y + 0.5 + offset.y(), side,
              [&](int row, double down) { found(column + reach, row + reach) += spread.weights[k] * across * down; });
@@ -265,7 +276,7 @@ CameraFootprint make_footprint(const Scene& fixture, const ReadyCamera& camera, 
   const int phases = side * side;
   if (diffraction != nullptr) {
     const double pitch_mm = std::visit([](const auto& one) { return 1e-3 * one.pixel_pitch_um; }, camera);
-    const std::vector<Cell> cells = cells_of(*diffraction, pitch_mm);
+    const std::vector<Cell> cells = cells_of(*diffraction, pitch_mm, is_lens);
     tbb::parallel_for(std::size_t{0}, middles.size(),
                       [&](std::size_t k) { diffract(camera, *diffraction, cells, band, middles[k], spreads[k]); });
   }
@@ -277,7 +288,8 @@ CameraFootprint make_footprint(const Scene& fixture, const ReadyCamera& camera, 
       scale = {scale_to_keep_variance(spread, 0, side), scale_to_keep_variance(spread, 1, side)};
     }
     for (int phase = 0; phase < phases; ++phase) {
-      made.kernels[k * phases + phase] = kernel_of(spread, scale, phase % side, phase / side, side);
+      made.kernels[k * phases + phase] =
+          kernel_of(spread, scale, phase % side, phase / side, side, diffraction != nullptr);
     }
   });
   for (const CameraFootprint::Kernel& kernel : made.kernels) {

@@ -34,7 +34,7 @@ std::optional<SampledRay<N>> sampled_ray(const PinholeCamera& camera, double x, 
     if (!ray) return std::nullopt;
     return SampledRay<N>{*ray};
   }
-  const std::optional<CameraRay> whole = pinhole_ray(camera, x, y, 0.5, 0.5);
+  const std::optional<CameraRay> whole = pinhole_ray(camera, x, y, u, v);
   if (!whole) return std::nullopt;
   const Eigen::Vector2d at = from_axis_mm(camera, x, y);
   const DiffractionSpread::Draw draw = camera.diffraction->draw(u, v);

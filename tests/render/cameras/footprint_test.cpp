@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <memory>
 
+#include "core/units.h"
 #include "render/cameras/camera_footprint.h"
 #include "tests/render/paths/light_scenes.h"
 
@@ -102,6 +104,46 @@ TEST(CameraFootprint, OfASharpCameraIsOnePixel) {
         static_cast<std::size_t>(footprint.margin + 11) * footprint.grid.columns + footprint.margin + 16 + k;
     EXPECT_NEAR(out[k], picture[point], 0.05f);
   }
+}
+
+// Of a sharp lens of f/22 at 620 nm a wave of period P keeps (2/pi) (acos s - s sqrt(1 - s^2)), s = 620 nm * 22 / P,
+// and the sinc of a pixel: 39 % for four pixels.
+TEST(CameraFootprint, OfASmallStopHasTheDiffractionLimit) {
+  const Scene air = empty_scene(0.0);
+  constexpr double kFNumber = 22.0;
+  constexpr int kPeriod_px = 4;
+  LensCamera lens;
+  lens.width = 64;
+  lens.height = 48;
+  lens.pixel_pitch_um = 6.0;
+  lens.focus_distance_mm = 27.0;
+  lens.matrix = matrix_of_lens(4.0, lens.focus_distance_mm, lens.pixel_pitch_um, lens.width, lens.height);
+  lens.gel_from_camera = look_at({0, 0, -27}, {0, 0, 0}, {0, 1, 0});
+  const double sensor = sensor_distance_mm(lens);
+  lens.aperture_mm = sensor / kFNumber;
+  Spectrum wavelengths(1);
+  wavelengths << 620.0;
+  lens.diffraction = std::make_shared<const DiffractionSpread>(DiffractingAperture{.diameter_mm = lens.aperture_mm,
+                                                                                   .foil_mm = 0.0,
+                                                                                   .to_sensor_mm = sensor,
+                                                                                   .per_object_mm = 1.0 / 27.0,
+                                                                                   .in_focus = true,
+                                                                                   .farthest_mm = 0.24,
+                                                                                   .wavelengths_nm = wavelengths});
+  const ReadyCamera camera = make_ready(lens);
+  const CameraFootprint footprint = make_footprint(air, camera, 0, level(camera, 16, 0.0), 16, 3.0);
+  ASSERT_EQ(footprint.spacing, 1);
+  double whole = 0.0;
+  double wave = 0.0;
+  for (const CameraFootprint::Tap& tap : footprint.kernel_at(24, 32).taps) {
+    whole += tap.weight;
+    wave += tap.weight * std::cos(2.0 * kPi * tap.column / kPeriod_px);
+  }
+  const double s = 620e-6 * kFNumber / (kPeriod_px * 1e-3 * lens.pixel_pitch_um);
+  const double limit = 2.0 / kPi * (std::acos(s) - s * std::sqrt(1.0 - s * s));
+  const double x = kPi / kPeriod_px;
+  EXPECT_NEAR(whole, 1.0, 1e-5);
+  EXPECT_NEAR(wave, limit * std::sin(x) / x, 0.02);
 }
 
 TEST(CameraFootprint, WidensBehindGlass) {

@@ -111,6 +111,30 @@ TEST(Plan, ASwitchOverrulesAndSaysSo) {
   EXPECT_THAT(effect(plan, "friction").why, HasSubstr("the scene switches it on"));
 }
 
+// Fresnel's number of the vhs hole at 455 nm is 0.05^2 / 455e-6 (1/5 + 1/20.1) = 1.37; a hole of 0.4 mm has 16 times
+// that.
+TEST(Plan, DiffractionIsHadOnlyWhereItIsAskedForAndCanBe) {
+  SceneSpec scene = shipped("ball-press.yaml");
+  EXPECT_FALSE(make_plan(scene).diffraction);
+  EXPECT_THAT(effect(make_plan(scene), "diffraction").why, HasSubstr("Fresnel's number of the hole is 1.4"));
+  scene.effects.diffraction = Switch::on;
+  EXPECT_TRUE(make_plan(scene).diffraction);
+  EXPECT_TRUE(make_plan(scene).shared_paths);
+  scene.outputs = {.frames = false};
+  EXPECT_FALSE(make_plan(scene).diffraction);
+  scene.outputs = {};
+  std::get<PinholeSpec>(scene.device.camera->optics).hole_diameter_um = 400.0;
+  EXPECT_THAT(test::message_of([&] { make_plan(scene); }),
+              AllOf(HasSubstr("effects.diffraction: on, but Fresnel's number of the hole is 22;"),
+                    HasSubstr("up to 12 diffraction is simulated")));
+  scene.effects.diffraction = Switch::automatic;
+  EXPECT_FALSE(make_plan(scene).diffraction);
+  scene = shipped("ball-press.yaml");
+  scene.effects.diffraction = Switch::on;
+  scene.device.gel.scattering_per_mm = Colour(1.0);
+  EXPECT_THAT(test::message_of([&] { make_plan(scene); }), HasSubstr("the gel scatters light"));
+}
+
 TEST(Plan, ATighterToleranceCallsForInterreflection) {
   SceneSpec scene = shipped("ball-press.yaml");
   EXPECT_FALSE(make_plan(scene).interreflection);
