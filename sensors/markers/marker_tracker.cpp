@@ -14,8 +14,9 @@ namespace {
 
 constexpr double kNeighbourReach = 1.6;  ///< of the spacing: the eight round a marker of a square grid
 constexpr double kAreaLearning = 0.05;   ///< how fast a marker's usual area follows the measured one, a frame
-constexpr double kRestSpread = 2.5;      ///< of markers' areas at rest, up and down
-constexpr double kAtRest = 0.1;          ///< of the spacing
+constexpr double kRestSpread =
+    2.5;  ///< of markers' areas at rest, up and down; chosen after a real board with one faint dot
+constexpr double kAtRest = 0.1;  ///< of the spacing
 constexpr std::size_t kLeastNeighbours = 3, kMostNeighbours = 12;
 constexpr double kFarthest = 1.5;  ///< of the median spacing: a marker that stands alone isn't searched for farther off
 constexpr double kStray = 0.6;  ///< of the distance to the nearest neighbour: off the median of the neighbours' motion
