@@ -177,7 +177,7 @@ CameraRays trace_to_layer(const Scene& fixture, const ReadyCamera& camera, const
           const DiffractionSpread::Draw draw = diffraction->draw(u, v);
           const Eigen::Vector2d at =
               std::visit([&](const auto& one) { return from_axis_mm(one, from.x(), from.y()); }, camera);
-          for (int band = 0; band < rays.bands; ++band) {
+          for (int band = 0; band < rays.bands && !is_lens; ++band) {
             spread[band] = diffraction->density(band, at, draw.away) / draw.density;
           }
           from = std::visit([&](const auto& one) { return image_point_at(one, at + draw.away); }, camera);

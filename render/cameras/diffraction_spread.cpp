@@ -46,7 +46,7 @@ DiffractionSpread::DiffractionSpread(const DiffractingAperture& aperture)
   });
   // Draws follow the mean of all tables round each ring; none is so rare that its weight gets large.
   constexpr int kAngles = 32;
-  constexpr double kEvenly = 0.02;
+  const double evenly = aperture.in_focus ? 0.0 : 0.02;  // a lens's draws have no weights
   const int rings = static_cast<int>(std::ceil(reach_ / step_));
   std::vector<double> part(rings);
   double whole = 0.0;
@@ -61,7 +61,7 @@ DiffractionSpread::DiffractionSpread(const DiffractingAperture& aperture)
   }
   within_.assign(1, 0.0);
   for (int i = 0; i < rings; ++i) {
-    within_.push_back(within_.back() + (1.0 - kEvenly) * part[i] / whole + kEvenly / rings);
+    within_.push_back(within_.back() + (1.0 - evenly) * part[i] / whole + evenly / rings);
   }
   for (double& one : within_) one /= within_.back();
 }

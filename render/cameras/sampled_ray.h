@@ -25,9 +25,11 @@ Bands<N> weights_of(const DiffractionSpread& spread, const Eigen::Vector2d& at, 
 }
 
 /// The mean over samples of weight, bands and radiance is the irradiance at an image point. With diffraction all light
-/// of a hole comes through its centre, from the direction of another image point. nullopt where no light passes.
+/// of a hole comes through its centre, from the direction of another image point. nullopt where no light passes. What
+/// `numbers` gives next doesn't depend on whether there's diffraction, so pictures with and without share their noise.
 template <int N>
-std::optional<SampledRay<N>> sampled_ray(const PinholeCamera& camera, double x, double y, SampleSequence& numbers) {
+std::optional<SampledRay<N>> sampled_ray(const PinholeCamera& camera, double x, double y, SampleSequence& numbers,
+                                         SampleSequence&) {
   const auto [u, v] = numbers.next_pair();
   if (!camera.diffraction) {
     const std::optional<CameraRay> ray = pinhole_ray(camera, x, y, u, v);
@@ -43,19 +45,21 @@ std::optional<SampledRay<N>> sampled_ray(const PinholeCamera& camera, double x, 
   return SampledRay<N>{ray, weights_of<N>(*camera.diffraction, at, draw)};
 }
 
-/// The same of a lens: its places are drawn as without diffraction, which spreads the image point.
+/// The same of a lens: its places are drawn as without diffraction, which spreads the image point by numbers of
+/// `other`, by the mean over the bands and the field, so that no weights add noise.
 template <int N>
-std::optional<SampledRay<N>> sampled_ray(const PreparedLens& camera, double x, double y, SampleSequence& numbers) {
+std::optional<SampledRay<N>> sampled_ray(const PreparedLens& camera, double x, double y, SampleSequence& numbers,
+                                         SampleSequence& other) {
   const auto [u, v] = numbers.next_pair();
   if (!camera.diffraction) return SampledRay<N>{lens_ray(camera, x, y, u, v)};
   const Eigen::Vector2d at = from_axis_mm(camera, x, y);
-  const auto [p, q] = numbers.next_pair();
+  const auto [p, q] = other.next_pair();
   const DiffractionSpread::Draw draw = camera.diffraction->draw(p, q);
   const Eigen::Vector2d from = image_point_at(camera, at + draw.away);
   // Beside the picture the distortion may have no inverse: there the picture is taken to go on as at the point itself.
   const bool known = view_direction(camera, from.x(), from.y()).has_value();
   const CameraRay ray = known ? lens_ray(camera, from.x(), from.y(), u, v) : lens_ray(camera, x, y, u, v);
-  return SampledRay<N>{ray, weights_of<N>(*camera.diffraction, at, draw)};
+  return SampledRay<N>{ray};
 }
 
 }  // namespace touchstone::render

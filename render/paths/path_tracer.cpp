@@ -23,6 +23,7 @@ constexpr double kShareMissed = 0.28867513459481287;
 // Shadow is rarer than light, and missing some of it matters less beside the light's own noise.
 constexpr std::uint32_t kProbesInTheDark = 8;
 constexpr std::uint32_t kProbesInTheLight = 4;
+constexpr std::uint64_t kOfDiffraction = 0xd6e8feb86659fd93ull;  // from a seed to one that shares no numbers with it
 
 void check_settings(const RenderSettings& settings, Eigen::Index bands) {
   if (settings.min_samples < 1 || settings.max_samples < settings.min_samples || settings.max_samples > (1 << 24)) {
@@ -118,7 +119,8 @@ ProbedRim<N> probe_rim(const PathIntegrator<N>& prober, const AnyCamera& camera,
     const auto [px, py] = numbers.next_pair();
     const double x = std::clamp(column - 1.0 + 3.0 * px, 0.0, static_cast<double>(camera.width));
     const double y = std::clamp(row - 1.0 + 3.0 * py, 0.0, static_cast<double>(camera.height));
-    const auto sample = sampled_ray<N>(camera, x, y, numbers);
+    SampleSequence other(seed ^ kOtherNumbers ^ kOfDiffraction, number, probe);
+    const auto sample = sampled_ray<N>(camera, x, y, numbers, other);
     if (!sample) continue;
     const CameraRay& ray = sample->ray;
     RayCounts own;
@@ -180,7 +182,8 @@ PixelResult<N> sample_pixel(const PathIntegrator<N>& integrator, const PathInteg
       Bands<N> value = Bands<N>::Zero();
       Bands<N> seen = value;
       Bands<N> own = Bands<N>::Ones();
-      if (const auto sample = sampled_ray<N>(camera, column + px, row + py, numbers)) {
+      SampleSequence other(settings.seed ^ kOfDiffraction, number, static_cast<std::uint32_t>(pixel.samples));
+      if (const auto sample = sampled_ray<N>(camera, column + px, row + py, numbers, other)) {
         const CameraRay& ray = sample->ray;
         const Bands<N> basic =
             integrator.trace(gel_from_camera * ray.origin, gel_from_camera.turn(ray.direction), numbers, counts);

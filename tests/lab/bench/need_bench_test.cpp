@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "tests/support/temporary_folder.h"
@@ -40,9 +41,10 @@ TEST(NeedBench, AFewScenesArePlannedAsTheyAreFound) {
     runs.push_back(run_need_trial(trial, {.finite_edges = 0.0}, {0.0, 1000, 128}, cache.path()));
     EXPECT_EQ(runs.back().failure, "") << trial.what;
     EXPECT_GE(runs.back().effects.size(), 2u) << trial.what;
-    // A first look's pixels are few: what is allowed to a fifth may come out on either side.
+    // A first look's pixels are few: what is allowed to a fifth may come out on either side. Far below what is allowed
+    // (seen: 0.2) it can't be distinguished from zero.
     for (const NeedOutcome& one : runs.back().effects) {
-      EXPECT_NEAR(one.planned, one.closely, 0.3 * one.closely) << trial.what << ": " << one.effect;
+      EXPECT_NEAR(one.planned, one.closely, std::max(0.3, 0.3 * one.closely)) << trial.what << ": " << one.effect;
     }
   }
   ASSERT_EQ(runs.size(), 2u);
