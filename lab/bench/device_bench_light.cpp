@@ -234,10 +234,7 @@ void find_exact_effects(BenchParts& parts) {
   sim::SceneSpec scene = bench_scene(parts.device, parts.presses, parts.presses.specs.front(), 1);
   const sim::Plan plan = sim::make_plan(scene);
   std::vector<std::string> left_out;
-  for (const sim::SwitchedEffect& one :
-       {sim::SwitchedEffect{"interreflection", &sim::EffectSwitches::interreflection, &sim::Plan::interreflection},
-        sim::SwitchedEffect{"fine relief", &sim::EffectSwitches::fine_relief, &sim::Plan::fine_relief},
-        sim::SwitchedEffect{"diffraction", &sim::EffectSwitches::diffraction, &sim::Plan::diffraction}}) {
+  for (const sim::SwitchedEffect& one : sim::kSeenEffects) {
     sim::SceneSpec with = scene;
     with.effects.*one.of = sim::Switch::on;
     try {

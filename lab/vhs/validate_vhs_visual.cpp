@@ -149,6 +149,40 @@ double expected_transfer_with_diffraction(const sim::DeviceSpec& device, const T
   return sum / whole;
 }
 
+/// What pictures of test rules show.
+struct FineLines {
+  double smallest_mm = std::numeric_limits<double>::infinity();  ///< division that is read, as are all coarser ones
+  double worst = 0.0;  ///< largest difference of a contrast from what is expected, of the printed contrast
+  ValidationSeries series;
+};
+
+/// `expected(scale, half_mm, picture)`: the part of the printed contrast that is expected within half_mm of the middle.
+/// @pre pitches fall, a whole number of pictures
+template <typename Expected>
+FineLines read_lines(const ValidateOptions& options, sim::SceneSpec scene, const VhsView& view,
+                     const std::vector<double>& pitches, const char* what, const Expected& expected) {
+  FineLines found;
+  found.series = {"divisions a mm", what, {}};
+  bool all_so_far = true;
+  for (std::size_t first = 0; first < pitches.size(); first += kHeights_mm.size()) {
+    const std::vector<TestScale> scales = scales_from(pitches, first);
+    scene.object = test_rule(scales);
+    const VhsPicture picture = vhs_picture(scene, options.quick ? 16 : 32, options.cache, options.progress);
+    const cv::Mat irradiance = sum_of_bands(picture.irradiance);
+    for (const TestScale& scale : scales) {
+      all_so_far = all_so_far && is_read(picture.frame, view, scale);
+      if (all_so_far) found.smallest_mm = std::min(found.smallest_mm, scale.pitch_mm);
+      // Farther out the foil leaves less of the hole open, and fine lines are seen better.
+      constexpr double kNear_mm = 3.0;
+      const RuleProfile light = scale_profile(irradiance, view, scale, kNear_mm);
+      const double left = contrast_at(light, 1.0 / scale.pitch_mm, 0.0) / printed_contrast();
+      found.series.points.emplace_back(1.0 / scale.pitch_mm, left);
+      found.worst = std::max(found.worst, std::abs(left - expected(scale, kNear_mm, picture)));
+    }
+  }
+  return found;
+}
+
 void add_diffraction_rows(const ValidateOptions& options, sim::SceneSpec scene, RowList& rows) {
   constexpr double kAllowed = 0.05;  // of what lies off the axis, where the foil hides a part of the hole
   const VhsView view(scene.device, 0.0);
@@ -158,35 +192,20 @@ void add_diffraction_rows(const ValidateOptions& options, sim::SceneSpec scene, 
                                                                 0.27, 0.25, 0.22, 0.2,  0.18, 0.16, 0.14, 0.12};
   scene.effects.diffraction = sim::Switch::on;
   const render::Spectrum wavelengths = sim::make_plan(scene).bands.centres_nm;
-  double smallest = std::numeric_limits<double>::infinity();
-  bool all_so_far = true;
-  double worst = 0.0;
-  ValidationSeries series{"divisions a mm", "contrast left with diffraction", {}};
-  for (std::size_t first = 0; first < pitches.size(); first += kHeights_mm.size()) {
-    const std::vector<TestScale> scales = scales_from(pitches, first);
-    scene.object = test_rule(scales);
-    const VhsPicture picture = vhs_picture(scene, options.quick ? 16 : 32, options.cache, options.progress);
-    const cv::Mat irradiance = sum_of_bands(picture.irradiance);
-    for (const TestScale& scale : scales) {
-      all_so_far = all_so_far && is_read(picture.frame, view, scale);
-      if (all_so_far) smallest = std::min(smallest, scale.pitch_mm);
-      constexpr double kNear_mm = 3.0;
-      const double left =
-          contrast_at(scale_profile(irradiance, view, scale, kNear_mm), 1.0 / scale.pitch_mm, 0.0) / printed_contrast();
-      series.points.emplace_back(1.0 / scale.pitch_mm, left);
-      worst = std::max(worst, std::abs(left - expected_transfer_with_diffraction(scene.device, scale,
-                                                                                 picture.irradiance, wavelengths)));
-    }
-  }
+  const FineLines found =
+      read_lines(options, scene, view, pitches, "contrast left with diffraction",
+                 [&](const TestScale& scale, double, const VhsPicture& picture) {
+                   return expected_transfer_with_diffraction(scene.device, scale, picture.irradiance, wavelengths);
+                 });
   rows.add_bounded("smallest_division_diffraction_mm",
                    "the same with the hole's diffraction: at this Fresnel number, about 1, it sharpens", "mm",
-                   Better::lower, kSubMillimetre_mm, true, smallest);
+                   Better::lower, kSubMillimetre_mm, true, found.smallest_mm);
   ValidationRow& transfer = rows.add("transfer_error_diffraction",
                                      "largest difference of the contrast of fine lines from Hopkins' transfer function "
                                      "on the axis and the pixel, of the printed contrast",
-                                     "1", worst, Better::lower, worst <= kAllowed);
+                                     "1", found.worst, Better::lower, found.worst <= kAllowed);
   transfer.reference = kAllowed;
-  transfer.series = std::move(series);
+  transfer.series = found.series;
 }
 
 void add_rule_rows(const ValidateOptions& options, RowList& rows) {
@@ -195,36 +214,20 @@ void add_rule_rows(const ValidateOptions& options, RowList& rows) {
   const std::vector<double> pitches =
       options.quick ? std::vector<double>{1.0, 0.6, 0.5, 0.4}
                     : std::vector<double>{1.0, 0.8, 0.7, 0.6, 0.55, 0.5, 0.48, 0.46, 0.44, 0.42, 0.4, 0.35};
-  double smallest = std::numeric_limits<double>::infinity();
-  bool all_so_far = true;
-  double worst = 0.0;
-  ValidationSeries series{"divisions a mm", "contrast left", {}};
-  for (std::size_t first = 0; first < pitches.size(); first += kHeights_mm.size()) {
-    const std::vector<TestScale> scales = scales_from(pitches, first);
-    scene.object = test_rule(scales);
-    const VhsPicture picture = vhs_picture(scene, options.quick ? 16 : 32, options.cache, options.progress);
-    const cv::Mat irradiance = sum_of_bands(picture.irradiance);
-    for (const TestScale& scale : scales) {
-      all_so_far = all_so_far && is_read(picture.frame, view, scale);
-      if (all_so_far) smallest = std::min(smallest, scale.pitch_mm);
-      // Farther out the foil leaves less of the hole open, and fine lines are seen better.
-      constexpr double kNear_mm = 3.0;
-      const RuleProfile light = scale_profile(irradiance, view, scale, kNear_mm);
-      const double left = contrast_at(light, 1.0 / scale.pitch_mm, 0.0) / printed_contrast();
-      series.points.emplace_back(1.0 / scale.pitch_mm, left);
-      worst = std::max(worst, std::abs(left - expected_transfer(scene.device, view, scale, kNear_mm)));
-    }
-  }
+  const FineLines found = read_lines(options, scene, view, pitches, "contrast left",
+                                     [&](const TestScale& scale, double half_mm, const VhsPicture&) {
+                                       return expected_transfer(scene.device, view, scale, half_mm);
+                                     });
   rows.add_bounded("smallest_division_mm",
                    "smallest division of a rule that is read through the gel: a tenth of its contrast left, lines "
                    "counted right and dark where they are, as are all coarser ones",
-                   "mm", Better::lower, kSubMillimetre_mm, true, smallest);
+                   "mm", Better::lower, kSubMillimetre_mm, true, found.smallest_mm);
   ValidationRow& transfer = rows.add("transfer_error",
                                      "largest difference of the contrast of fine lines from what the geometry of "
                                      "hole, foil, faces and pixel leaves, of the printed contrast",
-                                     "1", worst, Better::lower, worst <= kAllowedTransfer);
+                                     "1", found.worst, Better::lower, found.worst <= kAllowedTransfer);
   transfer.reference = kAllowedTransfer;
-  transfer.series = std::move(series);
+  transfer.series = found.series;
   add_diffraction_rows(options, scene, rows);
 }
 

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "render/cameras/camera_diffraction.h"
 
 namespace touchstone::render {
 namespace {
@@ -70,8 +71,7 @@ std::vector<Cell> cells_of(const DiffractionSpread& spread, double pitch_mm, boo
 /// Diffraction in place of what a hole's places do, or beside what a lens's do. Variances stay the geometric ones.
 void diffract(const ReadyCamera& camera, const DiffractionSpread& diffraction, const std::vector<Cell>& cells,
               std::optional<int> band, const Eigen::Vector2d& pixel, Spread& spread) {
-  const Eigen::Vector2d at =
-      std::visit([&](const auto& one) { return from_axis_mm(one, pixel.x(), pixel.y()); }, camera);
+  const Eigen::Vector2d at = from_axis_mm(camera, pixel);
   std::vector<Eigen::Vector2d> offsets;
   std::vector<double> weights;
   double whole = 0.0;
@@ -81,8 +81,7 @@ void diffract(const ReadyCamera& camera, const DiffractionSpread& diffraction, c
       density += diffraction.density(k, at, cell.away);
     }
     if (density == 0.0) continue;
-    const Eigen::Vector2d from =
-        std::visit([&](const auto& one) { return image_point_at(one, at + cell.away); }, camera);
+    const Eigen::Vector2d from = image_point_at(camera, at + cell.away);
     offsets.emplace_back(from - pixel);
     weights.push_back(density * cell.area);
     whole += weights.back();
@@ -243,7 +242,7 @@ CameraFootprint make_footprint(const Scene& fixture, const ReadyCamera& camera, 
                                const std::vector<double>& surface_z, int block, double rays_across, int most_spacing,
                                std::optional<int> band) {
   const std::vector<Eigen::Vector2d> middles = footprint_blocks(camera, block);
-  const DiffractionSpread* diffraction = std::visit([](const auto& one) { return one.diffraction.get(); }, camera);
+  const DiffractionSpread* diffraction = diffraction_of(camera);
   const bool is_lens = std::holds_alternative<PreparedLens>(camera);
   TS_ASSERT(surface_z.size() == middles.size());
   std::vector<Spread> spreads(middles.size());

@@ -1,4 +1,5 @@
 #include "render/cameras/camera_rays.h"
+#include "render/cameras/camera_diffraction.h"
 
 #include <tbb/parallel_for.h>
 
@@ -143,7 +144,7 @@ CameraRays trace_to_layer(const Scene& fixture, const ReadyCamera& camera, const
   if (!dark) rays.veil.assign(packet_count * kPacket * bands, 0.0f);
   const RigidTransform& camera_place = pose_of(camera);
   const double camera_index = index_at(fixture, camera_place);
-  const DiffractionSpread* diffraction = std::visit([](const auto& one) { return one.diffraction.get(); }, camera);
+  const DiffractionSpread* diffraction = diffraction_of(camera);
   const bool is_lens = std::holds_alternative<PreparedLens>(camera);
 
   tbb::parallel_for(0, rays.tiles, [&](int tile) {
@@ -175,12 +176,11 @@ CameraRays trace_to_layer(const Scene& fixture, const ReadyCamera& camera, const
           const auto [u, v] = is_lens ? numbers.next_pair() : std::array<double, 2>{hu, hv};
           if (!is_lens) hu = hv = 0.5;
           const DiffractionSpread::Draw draw = diffraction->draw(u, v);
-          const Eigen::Vector2d at =
-              std::visit([&](const auto& one) { return from_axis_mm(one, from.x(), from.y()); }, camera);
+          const Eigen::Vector2d at = from_axis_mm(camera, from);
           for (int band = 0; band < rays.bands && !is_lens; ++band) {
             spread[band] = diffraction->density(band, at, draw.away) / draw.density;
           }
-          from = std::visit([&](const auto& one) { return image_point_at(one, at + draw.away); }, camera);
+          from = image_point_at(camera, at + draw.away);
         }
         const auto ray = ray_near(camera, from.x(), from.y(), hu, hv);
         if (!ray) continue;

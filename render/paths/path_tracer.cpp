@@ -159,8 +159,9 @@ PixelResult<N> sample_pixel(const PathIntegrator<N>& integrator, const PathInteg
   ErrorEstimate total;
   ErrorEstimate electrons;
   Bands<N> sum = Bands<N>::Zero();
-  Bands<N> evenly = Bands<N>::Zero();   // the same without the bands' own weights
-  Bands<N> weights = Bands<N>::Zero();  // the sum of those
+  const bool diffracts = camera.diffraction != nullptr;
+  Bands<N> evenly = Bands<N>::Zero();   // with diffraction: the sum without the bands' own weights
+  Bands<N> weights = Bands<N>::Zero();  // and the sum of those
   Bands<N> electrons_per_irradiance = Bands<N>::Zero();
   if (settings.noise) electrons_per_irradiance = settings.noise->electrons_per_irradiance;
   const std::uint64_t number =
@@ -181,20 +182,24 @@ PixelResult<N> sample_pixel(const PathIntegrator<N>& integrator, const PathInteg
       ++counts.paths;
       Bands<N> value = Bands<N>::Zero();
       Bands<N> seen = value;
-      Bands<N> own = Bands<N>::Ones();
       SampleSequence other(settings.seed ^ kOfDiffraction, number, static_cast<std::uint32_t>(pixel.samples));
       if (const auto sample = sampled_ray<N>(camera, column + px, row + py, numbers, other)) {
         const CameraRay& ray = sample->ray;
         const Bands<N> basic =
             integrator.trace(gel_from_camera * ray.origin, gel_from_camera.turn(ray.direction), numbers, counts);
         const Bands<N> light = basic * (ray.weight * camera_index * camera_index);
-        own = sample->bands;
-        value = light * own;
-        // Diffraction's weights are 1 on the mean: what they make of evenly lit surroundings is no error.
-        seen = pixel.samples > 0 ? Bands<N>(value - (own - 1.0) * (evenly / pixel.samples)) : value;
-        evenly += light;
+        seen = value = light;
+        if (diffracts) {
+          value *= sample->bands;
+          // Weights are 1 on the mean: what they make of evenly lit surroundings is no error.
+          seen = value;
+          if (pixel.samples > 0) seen -= (sample->bands - 1.0) * (evenly / pixel.samples);
+          evenly += light;
+          weights += sample->bands;
+        }
+      } else {
+        weights += 1.0;
       }
-      weights += own;
       sum += value;
       if (value.sum() > brightest.sum()) brightest = value;
       total.add(seen.sum());
@@ -227,9 +232,10 @@ PixelResult<N> sample_pixel(const PathIntegrator<N>& integrator, const PathInteg
     }
     target = next_turn(pixel.samples, settings.min_samples, settings.max_samples);
   }
-  // The weighted mean: off by less than the weights' own scatter over the samples, and never below zero. Without
-  // diffraction it is the plain one.
-  pixel.irradiance = (weights > 0.0).select(sum / weights, 0.0);
+  // With diffraction the weighted mean: off by less than the weights' own scatter over the samples, and never below
+  // zero.
+  pixel.irradiance = diffracts ? Bands<N>((weights > 0.0).select(sum / weights, 0.0))
+                               : Bands<N>(sum / static_cast<double>(pixel.samples));
   pixel.standard_error = std::max(total.standard_error(), kShareMissed / pixel.samples * at_stake.sum());
   return pixel;
 }

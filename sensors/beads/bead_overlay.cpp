@@ -6,22 +6,15 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
+#include "sensors/image/drawing.h"
 
 namespace touchstone::sensors {
 
 namespace {
 
-constexpr int kShift = 4;  // fractional bits of OpenCV's drawing coordinates
 const cv::Scalar kFound(60, 200, 60);
 const cv::Scalar kMissing(40, 40, 230);
 const cv::Scalar kForce(230, 150, 30);
-
-/// OpenCV's drawing has pixel centres at whole numbers. A position far outside is drawn at the limit of its numbers.
-cv::Point drawn_at(const Eigen::Vector2d& position) {
-  constexpr double kFar = 20000.0;
-  const Eigen::Vector2d at = (position.array() - 0.5).max(-kFar).min(kFar);
-  return {static_cast<int>(std::lround(at.x() * (1 << kShift))), static_cast<int>(std::lround(at.y() * (1 << kShift)))};
-}
 
 }  // namespace
 
@@ -39,21 +32,18 @@ void draw_overlay(const cv::Mat& frame, const TrackedBeads& beads, const ForceEs
 
   cv::Mat eight = frame;
   if (frame.depth() == CV_16U) frame.convertTo(eight, CV_8U, 1.0 / 257.0);
-  if (eight.channels() == 1) {
-    cv::cvtColor(eight, picture, cv::COLOR_GRAY2BGR);
-  } else if (eight.data != picture.data) {
-    eight.copyTo(picture);
-  }
+  copy_in_colour(eight, picture);
 
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
   for (std::size_t i = 0; i < beads.positions.size(); ++i) {
     const cv::Scalar& colour = is_found(beads.status[i]) ? kFound : kMissing;
-    cv::circle(picture, drawn_at(beads.positions[i]), how.ring_px << kShift, colour, 1, cv::LINE_AA, kShift);
+    cv::circle(picture, drawn_at(beads.positions[i]), how.ring_px << kDrawingShift, colour, 1, cv::LINE_AA,
+               kDrawingShift);
     middle += beads.positions[i] / static_cast<double>(beads.positions.size());
   }
   const Eigen::Vector2d tip = middle + how.px_per_N * force.force.head<2>();
-  cv::line(picture, drawn_at(middle), drawn_at(tip), kForce, 2, cv::LINE_AA, kShift);
-  cv::circle(picture, drawn_at(tip), 3 << kShift, kForce, cv::FILLED, cv::LINE_AA, kShift);
+  cv::line(picture, drawn_at(middle), drawn_at(tip), kForce, 2, cv::LINE_AA, kDrawingShift);
+  cv::circle(picture, drawn_at(tip), 3 << kDrawingShift, kForce, cv::FILLED, cv::LINE_AA, kDrawingShift);
   std::array<char, 96> text{};
   std::snprintf(text.data(), text.size(), "x %.2f  y %.2f  z %.2f N%s", force.force.x(), force.force.y(),
                 force.force.z(), force.extrapolated || force.beads_missing > 0 ? " ?" : "");

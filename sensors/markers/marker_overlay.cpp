@@ -5,24 +5,17 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
+#include "sensors/image/drawing.h"
 
 namespace touchstone::sensors {
 
 namespace {
 
-constexpr int kShift = 4;            // fractional bits of OpenCV's drawing coordinates
 constexpr double kRing = 0.65;       // of a marker's diameter: just outside its rim
 constexpr double kLeastArrow = 0.5;  // px: a shorter one is noise
 const cv::Scalar kTrusted(60, 220, 60);
 const cv::Scalar kHeld(40, 40, 230);
 const cv::Scalar kArrow(0, 200, 255);
-
-/// OpenCV's drawing has pixel centres at whole numbers. A position far outside is drawn at the limit of its numbers.
-cv::Point drawn_at(const Eigen::Vector2d& position) {
-  constexpr double kFar = 20000.0;
-  const Eigen::Vector2d at = (position.array() - 0.5).max(-kFar).min(kFar);
-  return {static_cast<int>(std::lround(at.x() * (1 << kShift))), static_cast<int>(std::lround(at.y() * (1 << kShift)))};
-}
 
 }  // namespace
 
@@ -35,19 +28,17 @@ void draw_overlay(const cv::Mat& frame, const TrackedMarkers& markers, const Mar
   if (!(how.arrow_scale > 0.0 && std::isfinite(how.arrow_scale))) {
     fail("marker overlay: arrow_scale is {}, it must be above 0", how.arrow_scale);
   }
-  if (frame.channels() == 1) {
-    cv::cvtColor(frame, picture, cv::COLOR_GRAY2BGR);
-  } else if (frame.data != picture.data) {
-    frame.copyTo(picture);
-  }
-  const int ring = std::max(static_cast<int>(std::lround(kRing * appearance.diameter_px * (1 << kShift))), 1 << kShift);
+  copy_in_colour(frame, picture);
+  const int ring = std::max(static_cast<int>(std::lround(kRing * appearance.diameter_px * (1 << kDrawingShift))),
+                            1 << kDrawingShift);
   for (std::size_t i = 0; i < markers.rest.size(); ++i) {
     const bool trusted = markers.trusted(i);
-    cv::circle(picture, drawn_at(markers.positions[i]), ring, trusted ? kTrusted : kHeld, 1, cv::LINE_AA, kShift);
+    cv::circle(picture, drawn_at(markers.positions[i]), ring, trusted ? kTrusted : kHeld, 1, cv::LINE_AA,
+               kDrawingShift);
     const Eigen::Vector2d arrow = how.arrow_scale * markers.displacement(i);
     if (arrow.norm() < kLeastArrow) continue;
     cv::arrowedLine(picture, drawn_at(markers.rest[i]), drawn_at(markers.rest[i] + arrow), trusted ? kArrow : kHeld, 1,
-                    cv::LINE_AA, kShift, 0.3);
+                    cv::LINE_AA, kDrawingShift, 0.3);
   }
 }
 

@@ -10,7 +10,6 @@
 #include "core/units.h"
 #include "render/imager/mean_electrons.h"
 #include "sim/need/switched_effect.h"
-#include "sim/scene/device_camera.h"
 #include "sim/scene/device_imager.h"
 #include "sim/sensor/background_light.h"
 #include "sim/sensor/colour_numbers.h"
@@ -21,12 +20,6 @@ namespace touchstone::sim {
 namespace {
 
 constexpr double kAboutContact = 0.5;  // of the contact's radius
-
-constexpr SwitchedEffect kSeen[] = {
-    {"interreflection", &EffectSwitches::interreflection, &Plan::interreflection},
-    {"fine relief", &EffectSwitches::fine_relief, &Plan::fine_relief},
-    {"diffraction", &EffectSwitches::diffraction, &Plan::diffraction},
-};
 
 /// CV_8U, 255 for so many pixels as are looked at, drawn from those that see the contact or what is about it; of a
 /// picture that doesn't show it from all.
@@ -61,9 +54,8 @@ using TwoPictures = std::array<cv::Mat, 2>;
 
 /// Of a device with a background with what that adds where nothing is pressed, as the sensor's own pictures: it gives
 /// back most of what an effect makes of the untouched unit, so that much less than its whole light is left to change.
-TwoPictures pictures_of(const SceneView& view, const fem::PressState& press, const cv::Mat& mask, int paths,
-                        const std::vector<render::ImagerResponse>& responses) {
-  const render::Camera camera = planned_camera(view.scene, view.plan);
+TwoPictures pictures_of(const SceneView& view, const render::Camera& camera, const fem::PressState& press,
+                        const cv::Mat& mask, int paths, const std::vector<render::ImagerResponse>& responses) {
   const render::Tracer tracer = view.tracer(press);
   const cv::Mat& background = view.scene.device.background;
   std::optional<render::Tracer> rest;
@@ -125,7 +117,7 @@ void add_picture_needs(const SceneSpec& scene, const Plan& plan, const fem::Comp
                        SceneNeeds& needs) {
   if (plan.scattering || frames.empty()) return;
   const SceneView view(scene, plan, gel);
-  const render::Camera camera = camera_of(*scene.device.camera);
+  const render::Camera camera = planned_camera(scene, plan);
   const std::vector<render::ImagerResponse> responses =
       render::channel_responses(imager(scene.device, plan.bands, true));
   std::vector<cv::Mat> masks;
@@ -133,18 +125,20 @@ void add_picture_needs(const SceneSpec& scene, const Plan& plan, const fem::Comp
   for (const int k : frames) {
     const fem::PressState& press = truths[static_cast<std::size_t>(k)].press;
     masks.push_back(looked_at(view, camera, press, settings.pixels));
-    planned.push_back(pictures_of(view, press, masks.back(), settings.paths, responses));
+    planned.push_back(pictures_of(view, camera, press, masks.back(), settings.paths, responses));
   }
-  for (const SwitchedEffect& one : kSeen) {
+  for (const SwitchedEffect& one : kSeenEffects) {
     const std::optional<SwitchedScene> other = switched(scene, plan, one);
     if (!other) continue;
     EffectNeed need{one.name, {}, {}};
     try {
       const SceneView turned(other->scene, other->plan, gel, view);
+      const render::Camera seen_by = planned_camera(other->scene, other->plan);
       NoiseSum sum;
       for (std::size_t k = 0; k < frames.size(); ++k) {
         const fem::PressState& press = truths[static_cast<std::size_t>(frames[k])].press;
-        sum.add(planned[k], pictures_of(turned, press, masks[k], settings.paths, responses), masks[k], responses);
+        sum.add(planned[k], pictures_of(turned, seen_by, press, masks[k], settings.paths, responses), masks[k],
+                responses);
       }
       need.change.emplace().pixel_noise = sum.root();
       const SceneView& fine = plan.fine_relief ? view : turned;

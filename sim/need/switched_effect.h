@@ -14,6 +14,13 @@ struct SwitchedEffect {
   bool Plan::*planned;
 };
 
+/// Those of what is seen that have no closed form: they are measured by tracing pixels.
+inline constexpr SwitchedEffect kSeenEffects[] = {
+    {"interreflection", &EffectSwitches::interreflection, &Plan::interreflection},
+    {"fine relief", &EffectSwitches::fine_relief, &Plan::fine_relief},
+    {"diffraction", &EffectSwitches::diffraction, &Plan::diffraction},
+};
+
 /// A scene with one effect the other way, and its plan.
 struct SwitchedScene {
   SceneSpec scene;

@@ -12,6 +12,7 @@
 #include "core/random.h"
 #include "core/random_pairs.h"
 #include "core/units.h"
+#include "render/cameras/camera_diffraction.h"
 #include "render/cameras/rolling_shutter.h"
 #include "render/paths/shared_paths.h"
 #include "sim/press/exposure_times.h"
@@ -112,7 +113,7 @@ struct VirtualCamera::Parts : SceneView {
   ChangeFinder change_finder() const {
     const double nearest = std::max(1e-3, -scene.device.gel.thickness_mm - scene.device.camera->position_mm.z());
     PointBlur blur{least_blur_radius_px(camera), blur_radius_px(camera, nearest)};
-    if (const auto* spread = std::visit([](const auto& one) { return one.diffraction.get(); }, camera)) {
+    if (const auto* spread = render::diffraction_of(camera)) {
       blur.most_px += 1e3 * spread->reach_mm() / scene.device.camera->pixel_pitch_um;
     }
     return {response, *settings.noise, scene.light.change_tolerance, blur, size};

@@ -66,16 +66,22 @@ TEST(CameraFootprint, OfAPinholeIsADiscsWidth) {
   }
 }
 
+/// Of 4 mm, 27 mm before the face at z = 0.
+LensCamera lens_at_27_mm(int width, int height, double pitch_um, double focus_mm) {
+  LensCamera lens;
+  lens.width = width;
+  lens.height = height;
+  lens.pixel_pitch_um = pitch_um;
+  lens.focus_distance_mm = focus_mm;
+  lens.matrix = matrix_of_lens(4.0, focus_mm, pitch_um, width, height);
+  lens.gel_from_camera = look_at({0, 0, -27}, {0, 0, 0}, {0, 1, 0});
+  return lens;
+}
+
 TEST(CameraFootprint, OfALensIsItsBlurCircle) {
   const Scene air = empty_scene(0.0);
-  LensCamera lens;
-  lens.width = 320;
-  lens.height = 240;
-  lens.pixel_pitch_um = 5.6;
-  lens.focus_distance_mm = 24.0;
-  lens.matrix = matrix_of_lens(4.0, lens.focus_distance_mm, lens.pixel_pitch_um, lens.width, lens.height);
+  LensCamera lens = lens_at_27_mm(320, 240, 5.6, 24.0);
   lens.aperture_mm = 1.2;
-  lens.gel_from_camera = look_at({0, 0, -27}, {0, 0, 0}, {0, 1, 0});
   const ReadyCamera camera = make_ready(lens);
   const CameraFootprint footprint = make_footprint(air, camera, 0, level(camera, 16, 0.0), 16, 64.0);
   const double diameter = blur_circle_mm(lens, 27.0) / (lens.pixel_pitch_um * 1e-3);
@@ -112,13 +118,7 @@ TEST(CameraFootprint, OfASmallStopHasTheDiffractionLimit) {
   const Scene air = empty_scene(0.0);
   constexpr double kFNumber = 22.0;
   constexpr int kPeriod_px = 4;
-  LensCamera lens;
-  lens.width = 64;
-  lens.height = 48;
-  lens.pixel_pitch_um = 6.0;
-  lens.focus_distance_mm = 27.0;
-  lens.matrix = matrix_of_lens(4.0, lens.focus_distance_mm, lens.pixel_pitch_um, lens.width, lens.height);
-  lens.gel_from_camera = look_at({0, 0, -27}, {0, 0, 0}, {0, 1, 0});
+  LensCamera lens = lens_at_27_mm(64, 48, 6.0, 27.0);
   const double sensor = sensor_distance_mm(lens);
   lens.aperture_mm = sensor / kFNumber;
   Spectrum wavelengths(1);
