@@ -77,8 +77,8 @@ SensorSource virtual_sensors(const std::filesystem::path& cache_folder) {
     sim::VirtualSensorSettings settings = drawn_sensor_settings(prepared, unit);
     settings.light_key = to_json(light_identity(prepared)) + unit.text;
     if (const auto accuracy = sim::accuracy_of(unit.device.accuracy, {})) {
-      settings.light_key += fmt::format("\naccuracy {} {} {} {}", accuracy->force_percent, accuracy->pixel_noise,
-                                        accuracy->marker_px, accuracy->height_um);
+      settings.light_key += fmt::format("\naccuracy {} {} {} {} {}", accuracy->force_percent, accuracy->pixel_noise,
+                                        accuracy->marker_px, accuracy->height_um, accuracy->event_percent);
     }
     sim::cache_gel_of_unit_modulus(unit.device, cache_folder);
     const auto sensor = std::make_shared<const sim::VirtualSensor>(unit.device, cache_folder, settings);

@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "fem/contact/press_part.h"
 #include "fem/contact/press_report.h"
+#include "fem/contact/press_target.h"
 #include "fem/contact/tip_gap.h"
 
 namespace touchstone::fem {
@@ -48,42 +49,6 @@ RigidTransform between(const RigidTransform& a, const RigidTransform& b, double 
     result.rotation = Eigen::Quaterniond(a.rotation).slerp(fraction, Eigen::Quaterniond(b.rotation)).toRotationMatrix();
   }
   return result;
-}
-
-namespace {
-
-/// About the body's origin.
-Eigen::Vector3d torque_on(const BodySnapshot& body) {
-  return body.moment - body.pose.translation.cross(body.force);
-}
-
-}  // namespace
-
-void check_target(const PressTarget& target) {
-  if (!std::isfinite(target.seconds) || target.seconds < 0.0) {
-    fail("a step takes {} s; it must be finite and at least 0", target.seconds);
-  }
-  const char* const names[] = {"x", "y", "z"};
-  for (int a = 0; a < 3; ++a) {
-    if (!std::isfinite(target.axis[a].value)) {
-      fail("the {} {} of the press is {}, it must be finite", names[a],
-           target.axis[a].kind == Kind::force ? "force" : "position", target.axis[a].value);
-    }
-  }
-  if (!target.rotation.allFinite()) fail("the object's rotation holds NaN or infinity");
-  const double error = (target.rotation.transpose() * target.rotation - Eigen::Matrix3d::Identity()).norm();
-  if (error > 1e-6 || target.rotation.determinant() < 0.0) {
-    fail("the object's rotation isn't one: R^T R differs from 1 by {:.3g}, det R = {:.3g}", error,
-         target.rotation.determinant());
-  }
-  for (int a = 0; a < 3; ++a) {
-    if (target.torque[a] && !std::isfinite(*target.torque[a])) {
-      fail("the torque about {} of the press is {}, it must be finite", names[a], *target.torque[a]);
-    }
-  }
-  if (target.axis[2].kind == Kind::force && target.axis[2].value < 0.0) {
-    fail("a normal force of {} N is wanted: contact can't pull, it must be at least 0", target.axis[2].value);
-  }
 }
 
 struct Press::Parts {
@@ -215,63 +180,14 @@ double Press::Parts::add_segment(std::size_t b, const PressTarget& target, Path&
   double clear = 0.0;
   const BodySnapshot& here = now.bodies[b];
   BodySnapshot& start = path.start.bodies[b];
-  PartTarget to;
-  to.pose = {target.rotation, here.pose.translation};
-  double shear2 = 0.0;
-  for (int a = 0; a < 3; ++a) {
-    to.forced[a] = target.axis[a].kind == Kind::force;
-    if (to.forced[a]) {
-      to.force[a] = target.axis[a].value;
-      if (a < 2) shear2 += to.force[a] * to.force[a];
-    } else {
-      to.pose.translation[a] = target.axis[a].value;
-    }
-    to.turned[a] = target.torque[a].has_value();
-    to.torque[a] = target.torque[a].value_or(0.0);
-  }
-  // What torque has turned the body by is kept along the axes that are still under torque control.
-  Eigen::Vector3d turn = here.turn;
-  for (int a = 0; a < 3; ++a) {
-    if (!to.turned[a]) turn[a] = 0.0;
-  }
-  start.turn = turn;
-  if (turn.norm() > 0.0) {
-    to.pose.rotation = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix() * to.pose.rotation;
-  }
-
-  const double shear = std::sqrt(shear2);
-  if (to.forced[2]) {
-    const double held = to.force[2] > 0.0 && friction(b) > 0.0 ? friction(b) * to.force[2] : 0.0;
-    if (shear > 0.0 && shear >= held * (1.0 - 1e-9)) {
-      fail(
-          "gross slip: a shear force of {:.6g} N is wanted, but a normal force of {:.6g} N with a friction of {:.4g} "
-          "holds less than {:.6g} N",
-          shear, to.force[2], friction(b), held);
-    }
-  } else if (shear > 0.0 && friction(b) == 0.0) {
-    fail("gross slip: a shear force of {:.6g} N is wanted without friction", shear);
-  }
-
-  // No contact is farther from the body's origin than the body reaches, and none gives more than the normal force and
-  // the friction by it.
-  const BoundingBall ball = bounding_ball(solver.bodies()[b].shape);
-  const double arm = ball.centre.norm() + ball.radius;
-  const double most = arm * to.force[2] * std::hypot(1.0, friction(b));
-  if (solver.surface().flat && to.forced[2] && to.force[2] > 0.0 && to.torque.norm() > most) {
-    fail(
-        "the object turns over: a torque of {:.6g} N mm is wanted, but a normal force of {:.6g} N with a friction of "
-        "{:.4g} within {:.4g} mm of its origin holds at most {:.6g} N mm",
-        to.torque.norm(), to.force[2], friction(b), arm, most);
-  }
-
+  PartTarget to = part_target(target, here, start.turn);
+  refuse_what_slips(to, solver.bodies()[b], solver.surface().flat);
   const bool no_force = to.forced[2] && to.force[2] == 0.0;
   bool meets = here.touching && !no_force;
   if (!meets) {
     const auto touch = before_touch(b, target, to.pose, clear);
     meets = touch.has_value();
-    if (!meets && shear > 0.0) {
-      fail("gross slip: a shear force of {:.6g} N is wanted, but the object doesn't touch the gel", shear);
-    }
+    if (!meets) refuse_shear_of_nothing(to);
     start.pose = touch.value_or(to.pose);
     if (!touch) clear = 1.0;
     path.first_touch = path.first_touch || (meets && friction(b) > 0.0 && to.forced[2]);
@@ -279,16 +195,7 @@ double Press::Parts::add_segment(std::size_t b, const PressTarget& target, Path&
   if (!here.touching || no_force) path.start.forget(static_cast<int>(b));
   if (!meets)
     to.forced = to.turned = {};  // nothing to push against: it goes to the given position and turns no further
-  // A forced axis that nothing can push on stays where it is: without friction, along the surface.
-  if (friction(b) == 0.0) {
-    const auto& normals = solver.surface().normals;
-    for (int a = 0; a < 3; ++a) {
-      const bool pushed = std::any_of(normals.begin(), normals.end(),
-                                      [&](const Eigen::Vector3d& normal) { return std::abs(normal[a]) > 1e-12; });
-      if (!pushed) to.forced[a] = false;
-      if (solver.surface().flat && std::abs(normals.front()[a]) > 1.0 - 1e-12) to.turned[a] = false;
-    }
-  }
+  leave_free_axes(solver.surface(), friction(b), to);
   path.to.push_back(to);
   return clear;
 }
@@ -321,7 +228,7 @@ PressSnapshot Press::Parts::follow(std::span<const PressTarget> targets, Effort&
   if (!end) {
     for (std::size_t b = 0; b < targets.size(); ++b) {
       const PartTarget& to = path.to[b];
-      const double shear = std::hypot(to.forced[0] ? to.force[0] : 0.0, to.forced[1] ? to.force[1] : 0.0);
+      const double shear = wanted_shear(to);
       const double held = friction(b) * std::max(0.0, now.bodies[b].force.z());
       if (shear > 0.0 && !to.forced[2] && shear >= 0.9 * held) {
         fail("gross slip: a shear force of {:.6g} N is wanted, but the friction of {:.4g} holds about {:.6g} N", shear,

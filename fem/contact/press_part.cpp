@@ -19,7 +19,6 @@ constexpr int kPlainUpdates = 5;     // after these the fixed point is relaxed
 constexpr double kHoldFades = 0.25;  // an update, after the first few
 constexpr int kHeldUpdates = 2;
 constexpr double kLargestTurn = 0.1;     // radians an update, under torque control
-constexpr double kMostTurn = 0.8;        // radians in all
 constexpr double kJustTouching = 1e-12;  // of the thickness: an overlap of rounding is none
 
 /// Turns an answer without friction into one with three components a vertex.
@@ -31,12 +30,6 @@ void widen(ContactAnswer& answer, const Eigen::Ref<const Eigen::MatrixXd>& compl
     answer.z[3 * j] = p[j];
     if (p[j] != 0.0) answer.response += p[j] * compliance.col(3 * j);
   }
-}
-
-Eigen::Matrix3d turned_by(const Eigen::Vector3d& turn) {
-  const double angle = turn.norm();
-  if (angle == 0.0) return Eigen::Matrix3d::Identity();
-  return Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix();
 }
 
 /// Why a contact problem of so many candidates has no answer.
@@ -51,6 +44,12 @@ std::string no_answer(const ContactAnswer& answer, std::size_t candidates) {
 }
 
 }  // namespace
+
+Eigen::Matrix3d turned_by(const Eigen::Vector3d& turn) {
+  const double angle = turn.norm();
+  if (angle == 0.0) return Eigen::Matrix3d::Identity();
+  return Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix();
+}
 
 PartSolver::PartSolver(const Compliance& gel, std::vector<PressBody> bodies, double lookup_mm, double traction,
                        bool outlines, PronySeries relaxation)

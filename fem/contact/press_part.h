@@ -54,11 +54,13 @@ struct PressSnapshot {
   void forget(int body);
 };
 
+inline constexpr double kMostTurn = 0.8;  ///< radians, by which torque control may turn a body in all
+
+/// The rotation about the vector by its length, radians.
+Eigen::Matrix3d turned_by(const Eigen::Vector3d& turn);
+
 /// The pose at `fraction` of the straight path from a to b (rotations by slerp).
 RigidTransform between(const RigidTransform& a, const RigidTransform& b, double fraction);
-
-/// @throws Error unless the target is finite, its rotation one, and its normal force and its time not negative
-void check_target(const PressTarget& target);
 
 /// No contact, for a surface of n vertices.
 PressSnapshot untouched(std::vector<BodySnapshot> bodies, int n);

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "fem/elements/surface_strain.h"
 
@@ -87,6 +88,10 @@ PressState report(const Compliance& gel, const PartSolver& solver, const Surface
     const Eigen::Vector3d t = moving.segment<3>(3 * v);
     if (!t.isZero(0.0)) beads += bead_compliance.middleCols<3>(3 * v) * t;
   }
+  const auto soft = [](const PressBody& body) { return body.elastic != nullptr; };
+  if (snapshot.history.empty() && std::any_of(solver.bodies().begin(), solver.bodies().end(), soft)) {
+    s.object_gives = Eigen::VectorXd::Constant(n, std::numeric_limits<double>::quiet_NaN());
+  }
   double largest_pressure = 0.0;
   for (int v = 0; v < n; ++v) {
     if (snapshot.state[v] == NodeState::open) continue;
@@ -95,6 +100,9 @@ PressState report(const Compliance& gel, const PartSolver& solver, const Surface
     largest_pressure = std::max(largest_pressure, pressure);
     s.largest_tension = std::max(s.largest_tension, -pressure);
     const double area = surface.weight[v] * snapshot.share[v];
+    if (s.object_gives.size() > 0 && soft(solver.bodies()[snapshot.owner[v]])) {
+      s.object_gives[v] = (snapshot.weighted[3 * v + 2] - snapshot.relative[3 * v + 2]) / area;
+    }
     s.contact_area += area;
     ++s.contact_vertices;
     s.bodies[snapshot.owner[v]].contact_area += area;

@@ -70,9 +70,10 @@ void move_as_a_whole(const Compliance& gel, const PressState& press, SplineField
 }
 
 /// Gap per pixel from the undeformed surface plus `rest` up to the object, looked up where the gel has moved to along
-/// the surface. Endless beside a dome. `along` and `rest`: the coarse displacement's parts at the pixels.
+/// the surface. Endless beside a dome. `along` and `rest`: the coarse displacement's parts at the pixels;
+/// `object_rest`: what the object itself gives way, less its answer to the coarse pressure.
 std::vector<double> gaps(const SmoothSurface& surface, const PixelGrid& grid, const Eigen::MatrixX3d& along,
-                         const Eigen::MatrixX3d& rest, const ContactShape& shape,
+                         const Eigen::MatrixX3d& rest, const QuadraticField& object_rest, const ContactShape& shape,
                          const RigidTransform& gel_from_object) {
   const RigidTransform object_from_gel = gel_from_object.inverse();
   const Eigen::Vector3d up = object_from_gel.turn(Eigen::Vector3d::UnitZ());
@@ -87,7 +88,8 @@ std::vector<double> gaps(const SmoothSurface& surface, const PixelGrid& grid, co
       const auto row = static_cast<Eigen::Index>(k);
       const Eigen::Vector3d point(at.x() + along(row, 0), at.y() + along(row, 1), surface.rest_height(at));
       if ((point - centre).head<2>().squaredNorm() > ball.radius * ball.radius) continue;
-      if (const auto entry = first_entry(shape, object_from_gel * point, up)) gap[k] = *entry - rest(row, 2);
+      if (const auto entry = first_entry(shape, object_from_gel * point, up))
+        gap[k] = *entry - rest(row, 2) + object_rest.at(at);
     }
   });
   return gap;
@@ -131,6 +133,14 @@ ReliefAnswer solve_fine_relief(const SmoothSurface& surface, const PressState& p
   answer.misfit = coarse.largest_misfit;
   answer.solved.converged = true;
   if (!(coarse.force > 0.0)) return answer;
+  double opposite = 0.0;
+  QuadraticField object_rest;
+  if (settings.object) {
+    check(*settings.object);
+    const double nu = settings.object->poisson_ratio;
+    opposite = (1.0 - nu * nu) / settings.object->youngs_modulus;
+    object_rest = surface.object_rest(press, opposite, answer.layer);
+  }
 
   const double margin = settings.margin >= 0.0 ? settings.margin : std::max(2.0 * surface.edge(), 0.25 * gel.thickness);
   const PixelBox whole = whole_surface(gel, settings.pitch);
@@ -143,11 +153,11 @@ ReliefAnswer solve_fine_relief(const SmoothSurface& surface, const PressState& p
     check(grid);
     rest = coarse.rest.on_lattice(grid.columns_x(), grid.rows_y());
     const std::vector<double> gap = gaps(surface, grid, coarse.along.on_lattice(grid.columns_x(), grid.rows_y()), rest,
-                                         shape, press.gel_from_object);
+                                         object_rest, shape, press.gel_from_object);
     PixelContact contact{gap, {}};
     if (settings.control == ReliefControl::force) contact.force = coarse.force;
     start = carried_over(answer.grid.size() > 0 ? &answer : previous, grid);
-    const auto response = [&](const PixelGrid& of) { return surface.response(of.nx, of.ny, of.pitch); };
+    const auto response = [&](const PixelGrid& of) { return surface.response(of.nx, of.ny, of.pitch, opposite); };
     answer.solved =
         solve_in_part(response, box, common(pressed, box), settings.pitch, contact, settings.tolerance, start);
     answer.grid = grid;
@@ -159,6 +169,10 @@ ReliefAnswer solve_fine_relief(const SmoothSurface& surface, const PressState& p
   const PixelBox inner{whole.left + 1, whole.bottom + 1, whole.right - 1, whole.top - 1};
   const PixelGrid& grid = answer.grid;
   answer.height = std::move(answer.solved.displacement);
+  if (opposite > 0.0) {  // the gel's part of it
+    const std::shared_ptr<const LayerResponse> layer = surface.response(grid.nx, grid.ny, grid.pitch);
+    layer->apply(answer.pressure, answer.height, *layer->make_scratch());
+  }
   answer.contact.assign(grid.size(), 0);
   for (int j = 0; j < grid.ny; ++j) {
     for (int i = 0; i < grid.nx; ++i) {

@@ -34,10 +34,13 @@ struct ReliefSettings {
   /// frictionless flat punch of 3 mm pressed by a tenth of a gel of 5 mm meets 5 % less of it when followed).
   bool follow_surface = true;
   PixelTolerance tolerance;
+  /// Of an elastic object. Under the difference of the fine and the coarse pressure its surface gives way as an endless
+  /// half space; else as the coarse press has it (PressState::object_gives).
+  std::optional<ElasticMaterial> object = {};
 };
 
-/// The surface under the fine contact. Pixels stand on the undeformed surface (gel frame, z = 0, or on the dome); the
-/// one at x has moved to x + tangential + (0, 0, height).
+/// The surface under the fine contact, of the gel. Pixels stand on the undeformed surface (gel frame, z = 0, or on the
+/// dome); the one at x has moved to x + tangential + (0, 0, height).
 struct ReliefAnswer {
   PixelGrid grid;                ///< empty (0 x 0) out of contact
   std::vector<double> pressure;  ///< MPa, of the object on the gel

@@ -122,8 +122,12 @@ LayerResponse::Scratch::~Scratch() {
   fftw_free(data_);
 }
 
-LayerResponse::LayerResponse(const ElasticMaterial& material, double thickness, const PixelGrid& grid, GridEdges edges)
-    : grid_(grid), edges_(edges), material_(material), thickness_(thickness) {
+LayerResponse::LayerResponse(const ElasticMaterial& material, double thickness, const PixelGrid& grid, GridEdges edges,
+                             double opposite)
+    : grid_(grid), edges_(edges), material_(material), thickness_(thickness), opposite_(opposite) {
+  if (!(opposite >= 0.0) || !std::isfinite(opposite)) {
+    fail("what presses on the layer gives way by {} per MPa; it must be at least 0 and finite", opposite);
+  }
   fem::check(material);
   fem::check(grid);
   if (!(thickness > 0.0) || !std::isfinite(thickness)) {
@@ -142,7 +146,7 @@ LayerResponse::LayerResponse(const ElasticMaterial& material, double thickness, 
 }
 
 LayerResponse::LayerResponse(const LayerResponse& of, Inverse)
-    : grid_(of.grid_), edges_(of.edges_), material_(of.material_), thickness_(of.thickness_) {
+    : grid_(of.grid_), edges_(of.edges_), material_(of.material_), thickness_(of.thickness_), opposite_(of.opposite_) {
   const bool free = edges_ == GridEdges::free;
   transform_ = std::make_unique<Transform>(free ? quick_length(grid_.nx) : grid_.nx,
                                            free ? quick_length(grid_.ny) : grid_.ny, grid_.ny);
@@ -175,7 +179,7 @@ const LayerResponse& LayerResponse::on_wider_pixels() const {
   work_once(wider_made_, [&] {
     const PixelGrid wider{(grid_.nx + 1) / 2, (grid_.ny + 1) / 2, 2.0 * grid_.pitch,
                           grid_.first + Eigen::Vector2d::Constant(0.5 * grid_.pitch)};
-    wider_ = std::make_unique<const LayerResponse>(material_, thickness_, wider, GridEdges::free);
+    wider_ = std::make_unique<const LayerResponse>(material_, thickness_, wider, GridEdges::free, opposite_);
   });
   return *wider_;
 }
@@ -188,8 +192,10 @@ void LayerResponse::fill_periodic() {
     const double ky = 2.0 * std::numbers::pi / (t.height * grid_.pitch) * std::min(j, t.height - j);
     for (int i = 0; i <= t.width / 2; ++i) {
       const double kx = 2.0 * std::numbers::pi / (t.width * grid_.pitch) * i;
+      const double k = std::hypot(kx, ky);
+      const double half_space = k > 0.0 ? 2.0 * opposite_ / k : 0.0;
       symbol_[t.stride * static_cast<std::size_t>(j) + i] =
-          layer_compliance(material_, thickness_, std::hypot(kx, ky)) / pixels;
+          (layer_compliance(material_, thickness_, k) + half_space) / pixels;
     }
   });
 }
@@ -215,13 +221,14 @@ void LayerResponse::fill_free() {
     for (int i = 0; i < nx; ++i) {
       const double r = std::hypot(i, j) * pitch;
       const double rho = r / thickness_;
+      const auto at = [&](int di, int dj) { return corners[static_cast<std::size_t>(j + dj) * (nx + 1) + i + di]; };
       double influence = 0.0;
       if (rho <= LayerCorrection::kReach) {
-        const auto at = [&](int di, int dj) { return corners[static_cast<std::size_t>(j + dj) * (nx + 1) + i + di]; };
         const double mean_of_correction =
             correction.value(rho) + area / (24.0 * thickness_ * thickness_) * correction.laplacian(rho);
         influence = half_space * (at(1, 1) - at(0, 1) - at(1, 0) + at(0, 0) + area / thickness_ * mean_of_correction);
       }
+      if (opposite_ > 0.0) influence += opposite_ / std::numbers::pi * (at(1, 1) - at(0, 1) - at(1, 0) + at(0, 0));
       for (const int y : {j, (t.height - j) % t.height}) {
         for (const int x : {i, (t.width - i) % t.width}) t.row(scratch.data_, y)[x] = influence;
       }

@@ -55,9 +55,12 @@ class LayerResponse {
   /// Memory for one application of a response.
   class Scratch;
 
+  /// `opposite` (1/MPa): (1 - nu^2) / E of an elastic half space that presses on the layer and gives way, too; the
+  /// displacement is then of both, towards each other. Of periodic grids its mean isn't counted, as it has no end.
   /// @throws Error for a material, thickness or grid that isn't allowed, or if pixels of a free grid are wider than
   /// kWidestPixel allows (then the layer's correction isn't smooth over a pixel)
-  LayerResponse(const ElasticMaterial& material, double thickness, const PixelGrid& grid, GridEdges edges);
+  LayerResponse(const ElasticMaterial& material, double thickness, const PixelGrid& grid, GridEdges edges,
+                double opposite = 0.0);
   ~LayerResponse();
   LayerResponse(const LayerResponse&) = delete;
   LayerResponse& operator=(const LayerResponse&) = delete;
@@ -66,6 +69,7 @@ class LayerResponse {
   GridEdges edges() const { return edges_; }
   const ElasticMaterial& material() const { return material_; }
   double thickness() const { return thickness_; }
+  double opposite() const { return opposite_; }
 
   /// An approximate inverse, from displacement to pressure, to speed up iterations: each wave of a slightly larger cell
   /// by itself. Symmetric positive definite.
@@ -91,6 +95,7 @@ class LayerResponse {
   GridEdges edges_;
   ElasticMaterial material_;
   double thickness_;
+  double opposite_;
   std::unique_ptr<const Transform> transform_;
   std::unique_ptr<double[]> symbol_;  // real: of the padded grid's half spectrum, over the number of its pixels
   mutable std::once_flag inverse_made_, wider_made_;

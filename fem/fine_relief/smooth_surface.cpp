@@ -1,5 +1,6 @@
 #include "fem/fine_relief/smooth_surface.h"
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -262,10 +263,41 @@ std::vector<double> SmoothSurface::normal_displacement(const PressState& press, 
   return less_layer(rest, std::move(answer));
 }
 
-std::shared_ptr<const LayerResponse> SmoothSurface::response(int nx, int ny, double pitch) const {
+QuadraticField SmoothSurface::object_rest(const PressState& press, double opposite,
+                                          std::span<const double> layer) const {
+  const PixelGrid& grid = reference_grid();
+  const std::shared_ptr<const LayerResponse> both = response(grid.nx, grid.ny, grid.pitch, opposite);
+  std::vector<double> answer(grid.size());
+  both->apply(coarse_pressure(press), answer, *both->make_scratch());
+  for (std::size_t k = 0; k < answer.size(); ++k) answer[k] -= layer[k];
+  const Eigen::Map<const Eigen::VectorXd> half_space(answer.data(), static_cast<Eigen::Index>(answer.size()));
+  const Eigen::VectorXd means = grid.pixel_area() * (hats_.transpose() * half_space).cwiseQuotient(pixel_weight_);
+  std::vector<Eigen::Index> known;
+  QuadraticField rest;
+  for (Eigen::Index v = 0; v < press.object_gives.size(); ++v) {
+    if (std::isnan(press.object_gives[v])) continue;
+    known.push_back(v);
+    rest.middle += gel_.vertices[static_cast<std::size_t>(v)].head<2>();
+  }
+  if (known.empty()) return rest;
+  rest.middle /= static_cast<double>(known.size());
+  Eigen::MatrixXd terms(std::ssize(known), 6);
+  Eigen::VectorXd values(std::ssize(known));
+  for (Eigen::Index k = 0; k < values.size(); ++k) {
+    const Eigen::Index v = known[static_cast<std::size_t>(k)];
+    const double root = std::sqrt(weight_[v]);
+    terms.row(k) = root * QuadraticField::terms(gel_.vertices[static_cast<std::size_t>(v)].head<2>() - rest.middle);
+    values[k] = root * (press.object_gives[v] - means[v]);
+  }
+  // Of a few vertices, or of those in one line, the smallest one that there is.
+  rest.coefficients = terms.completeOrthogonalDecomposition().solve(values);
+  return rest;
+}
+
+std::shared_ptr<const LayerResponse> SmoothSurface::response(int nx, int ny, double pitch, double opposite) const {
   const auto fits = [&](const auto& one) {
     const PixelGrid& grid = one->grid();
-    return grid.nx == nx && grid.ny == ny && grid.pitch == pitch;
+    return grid.nx == nx && grid.ny == ny && grid.pitch == pitch && one->opposite() == opposite;
   };
   {
     const std::lock_guard lock(kept_mutex_);
@@ -277,7 +309,7 @@ std::shared_ptr<const LayerResponse> SmoothSurface::response(int nx, int ny, dou
   }
   // Two threads may make the same one; they are equal.
   auto made = std::make_shared<const LayerResponse>(gel_.material, gel_.thickness, PixelGrid{nx, ny, pitch, {0.0, 0.0}},
-                                                    GridEdges::free);
+                                                    GridEdges::free, opposite);
   const std::lock_guard lock(kept_mutex_);
   if (std::none_of(kept_.begin(), kept_.end(), fits)) kept_.push_back(made);
   std::size_t pixels = 0;

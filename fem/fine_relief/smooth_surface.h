@@ -29,6 +29,18 @@ struct SmoothDisplacement {
   double force = 0.0;           ///< N, of the coarse pressure
 };
 
+/// c0 + c1 x + c2 y + c3 x^2 + c4 x y + c5 y^2 about a place.
+struct QuadraticField {
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+  Eigen::Matrix<double, 6, 1> coefficients = Eigen::Matrix<double, 6, 1>::Zero();
+
+  /// What the coefficients are multiplied by, at `d` from the middle.
+  static Eigen::Matrix<double, 1, 6> terms(const Eigen::Vector2d& d) {
+    return {1.0, d.x(), d.y(), d.x() * d.x(), d.x() * d.y(), d.y() * d.y()};
+  }
+  double at(const Eigen::Vector2d& point) const { return terms(point - middle) * coefficients; }
+};
+
 /// Of all responses that a SmoothSurface keeps; some 40 bytes each.
 inline constexpr std::size_t kKeptPixels = 2'000'000;
 
@@ -65,9 +77,15 @@ class SmoothSurface {
                                           std::span<const double> pressure) const;
   const PixelGrid& reference_grid() const { return layer_->grid(); }
 
-  /// The endless layer under `nx` x `ny` free pixels of `pitch` mm, wherever they stand. Those that were asked for last
-  /// are kept, up to kKeptPixels: making one takes as long as using it ten times.
-  std::shared_ptr<const LayerResponse> response(int nx, int ny, double pitch) const;
+  /// The endless layer under `nx` x `ny` free pixels of `pitch` mm, wherever they stand, and what presses on it
+  /// (`opposite` as in LayerResponse). Those that were asked for last are kept, up to kKeptPixels: making one takes as
+  /// long as using it ten times.
+  std::shared_ptr<const LayerResponse> response(int nx, int ny, double pitch, double opposite = 0.0) const;
+
+  /// How far an elastic object's surface has given way along z (PressState::object_gives), less what an elastic half
+  /// space of that `opposite` does under the coarse pressure: the least squares' quadratic over what touches, for it
+  /// has no detail. `layer` of the press's SmoothDisplacement.
+  QuadraticField object_rest(const PressState& press, double opposite, std::span<const double> layer) const;
 
   /// Height of the undeformed surface, mm; beside a dome that of its rim.
   double rest_height(const Eigen::Vector2d& point) const;

@@ -320,11 +320,40 @@ DeformedGap deformed_gap(const TaylorHoodSpace& space, const OuterSurface& surfa
     }
   }
   const auto unknowns = 3 * static_cast<Eigen::Index>(space.nodes);
-  result.curvature.resize(unknowns, unknowns);
-  result.curvature.setFromTriplets(bends.begin(), bends.end());
+  result.curvature.emplace_back(unknowns, unknowns).setFromTriplets(bends.begin(), bends.end());
   result.gradient.resize(n, unknowns);
   result.gradient.setFromTriplets(entries.begin(), entries.end());
   return result;
+}
+
+DeformedGap merged_gap(std::vector<DeformedGap> gaps, const std::vector<int>& owner) {
+  if (gaps.size() == 1) return std::move(gaps.front());
+  const auto n = static_cast<Eigen::Index>(owner.size());
+  DeformedGap merged;
+  merged.weighted = Eigen::VectorXd::Constant(n, kInfinity);
+  merged.direction = Eigen::MatrixX3d::Zero(n, 3);
+  merged.gradient.resize(n, gaps.front().gradient.cols());
+  for (Eigen::Index v = 0; v < n; ++v) {
+    const int body = owner[static_cast<std::size_t>(v)];
+    merged.gradient.startVec(v);
+    if (body < 0) continue;
+    const DeformedGap& own = gaps[static_cast<std::size_t>(body)];
+    merged.weighted[v] = own.weighted[v];
+    merged.direction.row(v) = own.direction.row(v);
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(own.gradient, v); it; ++it) {
+      merged.gradient.insertBack(v, it.col()) = it.value();
+    }
+  }
+  merged.gradient.finalize();
+  for (std::size_t b = 0; b < gaps.size(); ++b) {
+    merged.deepest = std::min(merged.deepest, gaps[b].deepest);
+    merged.curvature.push_back(std::move(gaps[b].curvature.front()));
+    for (EdgeBulge& bulge : gaps[b].bulges) {
+      bulge.body = static_cast<int>(b);
+      merged.bulges.push_back(bulge);
+    }
+  }
+  return merged;
 }
 
 }  // namespace touchstone::fem

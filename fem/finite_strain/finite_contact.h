@@ -37,6 +37,7 @@ GapLines gap_lines(const TaylorHoodSpace& space, const OuterSurface& surface, co
 /// it has nothing to resist, and for small loads it vanishes beside the gel's own stiffness.
 struct EdgeBulge {
   std::array<int, 3> nodes{};  ///< middle, then the two ends
+  int body = 0;                ///< against which it bulges
   double value = 0.0;          ///< mm: gap in the middle less the ends' mean
   double stiffness = 0.0;      ///< N/mm
   std::array<Eigen::Vector3d, 3> gradient;
@@ -55,9 +56,9 @@ struct DeformedGap {
   /// n x (3 nodes), mm^2: row i holds d weighted_i / d u_node, 3 * node + component
   Eigen::SparseMatrix<double, Eigen::RowMajor> gradient;
   Eigen::MatrixX3d direction;  ///< n x 3, mm^2: the gradient's sum over nodes, d weighted_i / d (shift of the gel)
-  /// (3 nodes) x (3 nodes), MPa mm: the sum of pressure_i d^2 weighted_i / du^2, by the body's curvature under the
-  /// lines.
-  Eigen::SparseMatrix<double> curvature;
+  /// Of each body, (3 nodes) x (3 nodes), MPa mm: the sum of pressure_i d^2 weighted_i / du^2, by the body's curvature
+  /// under the lines.
+  std::vector<Eigen::SparseMatrix<double>> curvature;
   std::vector<EdgeBulge> bulges;
   double deepest = std::numeric_limits<double>::infinity();  ///< mm, the least gap of all; negative: overlap
 };
@@ -69,5 +70,8 @@ struct DeformedGap {
 DeformedGap deformed_gap(const TaylorHoodSpace& space, const OuterSurface& surface, const Eigen::VectorXd& weight,
                          const GapLines& lines, const Eigen::MatrixX3d& displacement, const ContactShape& shape,
                          const RigidTransform& gel_from_object, double overlap, const Eigen::VectorXd& pressure);
+
+/// Of several bodies' gaps each vertex's from the body that `owner` names; -1: none, its gap is infinite.
+DeformedGap merged_gap(std::vector<DeformedGap> gaps, const std::vector<int>& owner);
 
 }  // namespace touchstone::fem

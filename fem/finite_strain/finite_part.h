@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,30 +20,42 @@
 
 namespace touchstone::fem {
 
-/// A converged state of gel and object.
+/// An axis along which a body is led by a force or about which it's led by a torque.
+struct LedAxis {
+  int body = 0;
+  int axis = 0;      ///< 0 to 2: a shift along x, y, z of the gel frame; 3 to 5: a turn about them through its origin
+  double arm = 1.0;  ///< mm: how far the body reaches from its origin. A turn is counted in mm of so long an arm
+
+  bool turns() const { return axis >= 3; }
+  friend bool operator==(const LedAxis&, const LedAxis&) = default;
+};
+
+/// A converged state of gel and bodies.
 struct FiniteSnapshot {
-  RigidTransform pose;  ///< gel from object
+  std::vector<BodySnapshot> bodies;
   ElasticSolution elastic;
   Eigen::VectorXd pressure;  ///< n, MPa: the gap's multiplier
   Eigen::MatrixX3d shear;    ///< n x 3, MPa, on the gel
   std::vector<NodeState> state;
-  Eigen::Vector3d force = Eigen::Vector3d::Zero();  ///< on the object, N
-  bool touching = false;
-  DeformedGap gap;  ///< of a touching state; from an elastic object's surface as it is then
+  std::vector<int> owner;  ///< n, the body that has the least gap there; -1: none is near
+  bool touching = false;   ///< is any body?
+  DeformedGap gap;         ///< of a touching state; from an elastic object's surface as it is then
   /// n x 3, mm^3, gel frame: int phi_i g dA, by how much an elastic object's surface gives way, against the gel; known
-  /// where the gel touches and beside it, else zero; empty for a rigid one.
+  /// where the gel touches and beside it, else zero; empty if all are rigid.
   Eigen::MatrixX3d given;
   double penetration = 0.0;  ///< mm, the largest weighted gap below zero over its weight
   double residual = 0.0;     ///< of the contact laws
 };
 
-/// The gel at rest under an object at `pose`.
-FiniteSnapshot untouched(const FiniteGel& gel, const RigidTransform& pose);
+/// The gel at rest under bodies at these poses.
+FiniteSnapshot untouched(const FiniteGel& gel, std::vector<BodySnapshot> bodies);
 
-/// What contact does to the gel's nodes (nodes x 3, N): by its tractions, and by its edges against bulging.
-Eigen::MatrixX3d traction_forces(const FiniteGel& gel, const FiniteSnapshot& at);
-/// The part of these forces that acts against bulging (nodes x 3, N).
-Eigen::MatrixX3d bulge_forces(const FiniteGel& gel, const FiniteSnapshot& at);
+/// What a body's pressures do to the gel's nodes (nodes x 3, N).
+Eigen::MatrixX3d pressure_forces(const FiniteGel& gel, const FiniteSnapshot& at, int body);
+/// The same of all its tractions.
+Eigen::MatrixX3d traction_forces(const FiniteGel& gel, const FiniteSnapshot& at, int body);
+/// What it does beside them against edges that bulge (nodes x 3, N).
+Eigen::MatrixX3d bulge_forces(const FiniteGel& gel, const FiniteSnapshot& at, int body);
 
 /// What contact does to the vertex's hat, MPa: force per undeformed area.
 Eigen::Vector3d traction_at(const FiniteGel& gel, const FiniteSnapshot& at, int vertex);
@@ -56,15 +69,17 @@ struct FiniteTangent;
 class FinitePartSolver {
  public:
   /// Of the tolerance, `force`, `lookup_mm` and `traction` count (see FinitePress).
-  FinitePartSolver(const FiniteGel& gel, PressBody body, PressTolerance tolerance);
+  FinitePartSolver(const FiniteGel& gel, std::vector<PressBody> bodies, PressTolerance tolerance);
 
-  /// How deep the object reaches under the undeformed surface, mm; minus infinity if it isn't over it.
-  double overlap(const RigidTransform& pose) const;
-  /// The same of the object's lowest corner (fem/contact/tip_gap.h).
-  double tip_overlap(const RigidTransform& pose) const;
+  const std::vector<PressBody>& bodies() const { return bodies_; }
+  /// How deep a body reaches under the undeformed surface, mm; minus infinity if it isn't over it.
+  double overlap(int body, const RigidTransform& pose) const;
+  /// The same of its lowest corner (fem/contact/tip_gap.h).
+  double tip_overlap(int body, const RigidTransform& pose) const;
 
   /// The state at the end of the part, or nothing if Newton's method doesn't get there; why_not() then says why.
-  std::optional<FiniteSnapshot> solve(const FiniteSnapshot& from, const PartTarget& target, PartEffort& effort);
+  std::optional<FiniteSnapshot> solve(const FiniteSnapshot& from, std::span<const PartTarget> targets,
+                                      PartEffort& effort);
   const std::string& why_not() const { return why_not_; }
 
   /// The tangent that the next part begins with; nothing: it makes its own. A step that is taken back gives it back.
@@ -76,26 +91,32 @@ class FinitePartSolver {
   struct Iterate;
   struct Step;
   struct Now;
-  void evaluate(const GapLines* held, Iterate& iterate, PartEffort& effort) const;
+  double friction_at(const FiniteSnapshot& at, int vertex) const { return bodies_[at.owner[vertex]].friction; }
+  void find_gaps(bool anew, Iterate& iterate, PartEffort& effort) const;
+  void evaluate(bool anew, Iterate& iterate, PartEffort& effort) const;
   void give_way(bool anew, Iterate& iterate) const;
+  void give_way(int body, bool anew, const std::vector<int>& near, Iterate& iterate) const;
   void add_given(const Iterate& iterate, const std::vector<int>& block, int components,
                  Eigen::MatrixXd& compliance) const;
   std::vector<int> with_those_beside(const FiniteSnapshot& at, std::vector<int> vertices) const;
   std::vector<int> candidates(const FiniteSnapshot& at) const;
   Eigen::Vector2d slid(const FiniteSnapshot& from, const FiniteSnapshot& at, int vertex,
                        const Eigen::Matrix3d& axes) const;
-  double error_of(const FiniteSnapshot& from, const PartTarget& target, const Iterate& iterate) const;
-  bool cover(const PartTarget& target, const Iterate& iterate, const std::vector<int>& block);
-  bool factorise(const PartTarget& target, const Iterate& iterate, PartEffort& effort);
+  double error_of(const FiniteSnapshot& from, std::span<const PartTarget> targets, const Iterate& iterate) const;
+  bool cover(const Iterate& iterate, const std::vector<int>& block);
+  bool factorise(const Iterate& iterate, PartEffort& effort);
   Now now_at(const FiniteSnapshot& from, const Iterate& iterate, const std::vector<int>& block) const;
-  bool find_step(const FiniteSnapshot& from, const PartTarget& target, Iterate& iterate, Step& step,
+  bool find_step(const FiniteSnapshot& from, std::span<const PartTarget> targets, Iterate& iterate, Step& step,
                  PartEffort& effort);
+  bool move_bodies(const Step& step, double factor, std::vector<BodySnapshot>& bodies);
   std::optional<FiniteSnapshot> finished(Iterate iterate);
-  bool take_step(const PartTarget& target, const Step& step, double& factor, Iterate& iterate);
+  bool take_step(const Step& step, double& factor, Iterate& iterate);
 
   const FiniteGel& gel_;
-  PressBody body_;
-  std::unique_ptr<const ElasticBody> soft_;  ///< none: the object is rigid
+  std::vector<PressBody> bodies_;
+  std::vector<std::unique_ptr<const ElasticBody>> soft_;  ///< per body; none: it is rigid
+  bool any_soft_ = false;
+  int components_ = 1;  ///< rows a vertex, as in LawRows
   PressTolerance tolerance_;
   int n_;
   std::shared_ptr<const FiniteTangent> tangent_;

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -50,16 +51,43 @@ Eigen::MatrixX3d vertex_slopes(const std::vector<Eigen::Vector3d>& corners,
 /// deep, on any mesh).
 void FinitePartSolver::give_way(bool anew, Iterate& iterate) const {
   FiniteSnapshot& at = iterate.at;
+  at.given = Eigen::MatrixX3d::Zero(n_, 3);
+  iterate.soft.resize(bodies_.size());
+  if (anew) iterate.face = Eigen::MatrixX3d::Zero(n_, 3);
+  const std::vector<int> near = with_those_beside(at, candidates(at));
+  for (int b = 0; b < std::ssize(bodies_); ++b) {
+    if (soft_[b]) give_way(b, anew, near, iterate);
+  }
+  std::vector<Eigen::Triplet<double>> turned;
+  for (const std::shared_ptr<const Soft>& soft : iterate.soft) {
+    if (!soft) continue;
+    for (const int v : soft->vertices) {
+      at.gap.weighted[v] += at.gap.direction.row(v).dot(at.given.row(v)) / gel_.rest.weight[v];
+      for (RowSparse::InnerIterator it(gel_.coupling, v); it; ++it) {
+        for (int a = 0; a < 3; ++a) turned.emplace_back(v, 3 * it.col() + a, it.value() * iterate.face(v, a));
+      }
+    }
+  }
+  RowSparse by_face(at.gap.gradient.rows(), at.gap.gradient.cols());
+  by_face.setFromTriplets(turned.begin(), turned.end());
+  at.gap.gradient += by_face;
+}
+
+/// One body's part of it: what is given, and how the directions of its gaps turn. `near`: vertices that may touch any.
+void FinitePartSolver::give_way(int body, bool anew, const std::vector<int>& near, Iterate& iterate) const {
+  FiniteSnapshot& at = iterate.at;
   const auto place_of = [&](int v) -> Eigen::Vector3d {
     return gel_.rest.vertices[v] + at.elastic.displacement.row(gel_.outer.mesh_vertex[v]).transpose();
   };
-  std::vector<int> wanted = with_those_beside(at, candidates(at));
-  const bool covered = iterate.soft && std::includes(iterate.soft->vertices.begin(), iterate.soft->vertices.end(),
-                                                     wanted.begin(), wanted.end());
+  std::vector<int> wanted;
+  std::copy_if(near.begin(), near.end(), std::back_inserter(wanted), [&](int v) { return at.owner[v] == body; });
+  const std::shared_ptr<const Soft>& known = iterate.soft[body];
+  const bool covered =
+      known && std::includes(known->vertices.begin(), known->vertices.end(), wanted.begin(), wanted.end());
   if (anew || !covered) {
     ContactSurface deformed = gel_.rest;
     for (int v = 0; v < n_; ++v) deformed.vertices[v] = place_of(v);
-    deformed.normals = iterate.lines.normals;
+    deformed.normals = iterate.lines[body].normals;
     const auto m = static_cast<Eigen::Index>(wanted.size());
     auto soft = std::make_shared<Soft>();
     soft->vertices = std::move(wanted);
@@ -68,19 +96,22 @@ void FinitePartSolver::give_way(bool anew, Iterate& iterate) const {
       const std::array<Eigen::Index, 3> places = {soft->place(t[0]), soft->place(t[1]), soft->place(t[2])};
       if (*std::min_element(places.begin(), places.end()) >= 0) soft->triangles.push_back(places);
     }
-    soft_->add_to(soft->compliance, 1.0, deformed, soft->vertices, std::vector<char>(soft->vertices.size(), 1),
-                  std::vector<Eigen::Matrix3d>(soft->vertices.size(), Eigen::Matrix3d::Identity()), at.pose, {},
-                  nullptr);
-    iterate.soft = std::move(soft);
+    soft_[body]->add_to(soft->compliance, 1.0, deformed, soft->vertices, std::vector<char>(soft->vertices.size(), 1),
+                        std::vector<Eigen::Matrix3d>(soft->vertices.size(), Eigen::Matrix3d::Identity()),
+                        at.bodies[body].pose, {}, nullptr);
+    iterate.soft[body] = std::move(soft);
   }
-  const Soft& soft = *iterate.soft;
+  const Soft& soft = *iterate.soft[body];
   const auto m = std::ssize(soft.vertices);
   const auto give = [&] {
     Eigen::VectorXd tractions(3 * m);
     for (Eigen::Index k = 0; k < m; ++k) tractions.segment<3>(3 * k) = traction_at(gel_, at, soft.vertices[k]);
     const Eigen::VectorXd given = soft.compliance * tractions;
-    at.given = Eigen::MatrixX3d::Zero(n_, 3);
     for (Eigen::Index k = 0; k < m; ++k) at.given.row(soft.vertices[k]) = given.segment<3>(3 * k).transpose();
+  };
+  const auto turn_face = [&](const Eigen::MatrixX3d& rigid) {
+    for (const int v : soft.vertices)
+      at.gap.direction.row(v) = rigid.row(v) + gel_.rest.weight[v] * iterate.face.row(v);
   };
   const Eigen::MatrixX3d rigid = at.gap.direction;
   if (anew) {
@@ -96,45 +127,38 @@ void FinitePartSolver::give_way(bool anew, Iterate& iterate) const {
         along[k] = at.gap.direction.row(v).dot(at.given.row(v)) / (weight * weight);
       }
       const Eigen::MatrixX3d slopes = vertex_slopes(corners, soft.triangles, along);
-      iterate.face = Eigen::MatrixX3d::Zero(n_, 3);
       for (Eigen::Index k = 0; k < m; ++k) iterate.face.row(soft.vertices[k]) = slopes.row(k);
-      at.gap.direction = rigid + gel_.rest.weight.asDiagonal() * iterate.face;
+      turn_face(rigid);
     }
   } else {
-    at.gap.direction += gel_.rest.weight.asDiagonal() * iterate.face;
+    turn_face(rigid);
   }
   give();
-  std::vector<Eigen::Triplet<double>> turned;
-  for (const int v : soft.vertices) {
-    at.gap.weighted[v] += at.gap.direction.row(v).dot(at.given.row(v)) / gel_.rest.weight[v];
-    for (RowSparse::InnerIterator it(gel_.coupling, v); it; ++it) {
-      for (int a = 0; a < 3; ++a) turned.emplace_back(v, 3 * it.col() + a, it.value() * iterate.face(v, a));
-    }
-  }
-  RowSparse by_face(at.gap.gradient.rows(), at.gap.gradient.cols());
-  by_face.setFromTriplets(turned.begin(), turned.end());
-  at.gap.gradient += by_face;
 }
 
-/// Adds the object's part for the block's rows of laws, as many a vertex as in LawRows. @pre an elastic object, which
-/// the iterate's `soft` covers
+/// Adds the elastic bodies' part for the block's rows of laws, as many a vertex as in LawRows. @pre the iterate's
+/// `soft` covers what they touch of it
 void FinitePartSolver::add_given(const Iterate& iterate, const std::vector<int>& block, int components,
                                  Eigen::MatrixXd& compliance) const {
-  const Soft& soft = *iterate.soft;
   const auto m = std::ssize(block);
   const Eigen::Index c = components;
   std::vector<Eigen::Matrix3d> laws;  // rows: how the vertex's gap and slips change with what is given there
-  std::vector<Eigen::Index> places;
   for (const int v : block) {
     Eigen::Matrix3d rows = iterate.axes[v].transpose();
     rows.row(0) = iterate.at.gap.direction.row(v) / gel_.rest.weight[v];
     laws.push_back(rows);
-    places.push_back(soft.place(v));
   }
-  for (Eigen::Index j = 0; j < m; ++j) {
-    for (Eigen::Index i = 0; i < m; ++i) {
-      const Eigen::Matrix3d own = soft.compliance.block<3, 3>(3 * places[i], 3 * places[j]);
-      compliance.block(c * i, c * j, c, c) += (laws[i] * own * laws[j].transpose()).topLeftCorner(c, c);
+  for (int body = 0; body < std::ssize(bodies_); ++body) {
+    if (!soft_[body]) continue;
+    const Soft& soft = *iterate.soft[body];
+    std::vector<Eigen::Index> places;  // -1: another body's
+    for (const int v : block) places.push_back(iterate.at.owner[v] == body ? soft.place(v) : -1);
+    for (Eigen::Index j = 0; j < m; ++j) {
+      for (Eigen::Index i = 0; i < m; ++i) {
+        if (places[i] < 0 || places[j] < 0) continue;
+        const Eigen::Matrix3d own = soft.compliance.block<3, 3>(3 * places[i], 3 * places[j]);
+        compliance.block(c * i, c * j, c, c) += (laws[i] * own * laws[j].transpose()).topLeftCorner(c, c);
+      }
     }
   }
 }

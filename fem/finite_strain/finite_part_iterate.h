@@ -27,18 +27,20 @@ struct FinitePartSolver::Soft {
 /// One Newton iterate, and what is known there.
 struct FinitePartSolver::Iterate {
   FiniteSnapshot at;
-  GapLines lines;
-  std::shared_ptr<const Soft> soft;                  ///< of an elastic object, along these lines
-  Eigen::MatrixX3d face;                             ///< n x 3, likewise: how what it gives changes along the surface
-  std::vector<Eigen::Matrix3d> axes;                 ///< per vertex; only where it has a gap
-  Eigen::VectorXd inside;                            ///< residual without the tractions of contact
-  Eigen::Vector3d bulges = Eigen::Vector3d::Zero();  ///< sum of bulge_forces, N
-  Eigen::VectorXd tangential_scale;                  ///< mm^3 per MPa, per vertex, of the last compliance
-  double balance = 0.0;                              ///< residual over the elements' forces
-  double size = 0.0;                                 ///< those forces
-  double least_size = 0.0;                           ///< what `balance` takes for them at least: a gel that is let go
-                                                     ///< comes to rest, where there are none
-  double least = 0.0;                                ///< J
+  std::vector<LedAxis> led;                       ///< of the part
+  std::vector<GapLines> lines;                    ///< per body
+  std::vector<std::shared_ptr<const Soft>> soft;  ///< per body, of an elastic one, along its lines
+  Eigen::MatrixX3d face;                          ///< n x 3, likewise: how what it gives changes along the surface
+  std::vector<Eigen::Matrix3d> axes;              ///< per vertex; only where it has a gap
+  Eigen::VectorXd inside;                         ///< residual without the tractions of contact
+  Eigen::VectorXd bulges;                         ///< per led axis: the work of bulge_forces along it, N
+  Eigen::VectorXd along;                          ///< per led axis: what acts on the body, N
+  Eigen::VectorXd tangential_scale;               ///< mm^3 per MPa, per vertex, of the last compliance
+  double balance = 0.0;                           ///< residual over the elements' forces
+  double size = 0.0;                              ///< those forces
+  double least_size = 0.0;                        ///< what `balance` takes for them at least: a gel that is let go
+                                                  ///< comes to rest, where there are none
+  double least = 0.0;                             ///< J
 };
 
 }  // namespace touchstone::fem

@@ -19,8 +19,8 @@ constexpr double kHold = 1000.0;  // over the surface's own stiffness
 constexpr double kShiftStiffness = 0.1;
 constexpr double kShiftLeft = 1e-4;  // for axes along which all slips
 
-/// The gel's tree with the object's shifts above it.
-EliminationTree with_shifts(EliminationTree tree, int first, int end) {
+/// The gel's tree with the led axes above it.
+EliminationTree with_led_axes(EliminationTree tree, int first, int end) {
   if (first == end) return tree;
   const int top = static_cast<int>(tree.parent.size());
   for (int& parent : tree.parent) {
@@ -35,11 +35,11 @@ EliminationTree with_shifts(EliminationTree tree, int first, int end) {
 }  // namespace
 
 FiniteTangent finite_tangent(const FiniteGel& gel, const FiniteSnapshot& at, const std::vector<Eigen::Matrix3d>& axes,
-                             std::vector<int> block, int components, std::vector<int> forced) {
+                             std::vector<int> block, int components, std::vector<LedAxis> led) {
   const Scales& scales = gel.problem.scales();
-  const LawRows laws = law_rows(gel, at.gap, axes, block, components, forced);
+  const LawRows laws = law_rows(gel, at, axes, block, components, led);
   SymmetricEntries matrix = gel.problem.tangent(at.elastic);
-  add_contact_stiffness(gel, at.gap, forced, matrix);
+  add_contact_stiffness(gel, at, led, matrix);
   for (int i = gel.space.unknowns; i < laws.inner; ++i) matrix.add(i, i, kShiftStiffness);
   // The border is scaled to be of the order of one beside the elements' blocks, as in compute_compliance.
   const double border = std::sqrt(static_cast<double>(gel.mesh.outer.size())) / (scales.length * scales.length);
@@ -49,25 +49,25 @@ FiniteTangent finite_tangent(const FiniteGel& gel, const FiniteSnapshot& at, con
   const auto last = static_cast<int>(laws.rows.size());
   matrix.size = laws.inner + last;
   std::optional<FrontalFactor> factor =
-      FrontalFactor::make(matrix, last, with_shifts(gel.tree, gel.space.unknowns, laws.inner));
+      FrontalFactor::make(matrix, last, with_led_axes(gel.tree, gel.space.unknowns, laws.inner));
   if (!factor) fail("the gel's tangent is singular");
   Eigen::MatrixXd compliance = factor->complement() * (-scales.length / force_scale(gel) / (border * border));
-  return {std::move(block), std::move(forced), components, std::move(compliance),
+  return {std::move(block), std::move(led), components, std::move(compliance),
           std::make_shared<const FrontalFactor>(std::move(*factor))};
 }
 
-FiniteTangent with_vertices(const FiniteTangent& tangent, const FiniteGel& gel, const DeformedGap& gap,
+FiniteTangent with_vertices(const FiniteTangent& tangent, const FiniteGel& gel, const FiniteSnapshot& at,
                             const std::vector<Eigen::Matrix3d>& axes, const std::vector<int>& more) {
   const int c = tangent.components;
-  FiniteTangent wider{{}, tangent.forced, c, {}, tangent.factor};
+  FiniteTangent wider{{}, tangent.led, c, {}, tangent.factor};
   std::vector<int> rows_before;  // of the block, and where they are in the wider one
   std::vector<int> rows_kept;
   for (std::size_t j = 0; j < tangent.block.size(); ++j) {
-    if (!std::isfinite(gap.weighted[tangent.block[j]])) continue;
+    if (!std::isfinite(at.gap.weighted[tangent.block[j]])) continue;
     wider.block.push_back(tangent.block[j]);
     for (int t = 0; t < c; ++t) rows_before.push_back(c * static_cast<int>(j) + t);
   }
-  const auto shifts = static_cast<int>(tangent.forced.size());
+  const auto shifts = static_cast<int>(tangent.led.size());
   for (int b = 0; b < shifts; ++b) rows_before.push_back(c * static_cast<int>(tangent.block.size()) + b);
   wider.block.insert(wider.block.end(), more.begin(), more.end());
   std::sort(wider.block.begin(), wider.block.end());
@@ -78,7 +78,7 @@ FiniteTangent with_vertices(const FiniteTangent& tangent, const FiniteGel& gel, 
     for (int t = 0; t < c; ++t) (known ? rows_kept : rows_new).push_back(c * static_cast<int>(j) + t);
   }
   for (int b = 0; b < shifts; ++b) rows_kept.push_back(c * static_cast<int>(wider.block.size()) + b);
-  const LawRows laws = law_rows(gel, gap, axes, wider.block, c, tangent.forced);
+  const LawRows laws = law_rows(gel, at, axes, wider.block, c, tangent.led);
   Eigen::MatrixXd loads = Eigen::MatrixXd::Zero(laws.inner, std::ssize(rows_new));
   for (std::size_t k = 0; k < rows_new.size(); ++k) {
     for (const auto& [i, x] : laws.rows[static_cast<std::size_t>(rows_new[k])]) {

@@ -95,6 +95,7 @@ struct EffectShare {
 struct PlannedWay {
   std::string name;                              ///< "by need"
   std::string effects;                           ///< those that are on, of what either plan may switch
+  std::string light;                             ///< how pictures are made, as the camera says it
   double pixel_error = kUnknown;                 ///< root mean square, of the imager's noise
   double once_s = kUnknown, frame_s = kUnknown;  ///< of whole pictures
   std::string note;                              ///< why there is no error

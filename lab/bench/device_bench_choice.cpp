@@ -81,12 +81,12 @@ std::optional<LightSetting> pick_light(const BenchParts& parts, const std::vecto
     // distinguished from zero is taken for as large as it may be.
     const double measured = std::max(holds->pixel_error, parts.least_pixel_error);
     const double slope = std::log(coarser->pixel_error / measured) /
-                         std::log(coarser->light.noise_fraction / holds->light.noise_fraction);
+                         std::log(*coarser->light.noise_fraction / *holds->light.noise_fraction);
     LightSetting between = *holds;
-    between.light.noise_fraction *= std::pow(kBelow * wanted / measured, 1.0 / std::max(slope, 0.1));
-    if (between.light.noise_fraction > 1.05 * holds->light.noise_fraction &&
-        between.light.noise_fraction < coarser->light.noise_fraction) {
-      between.words = paths_in_words(between.light.noise_fraction) + parts.exact_words;
+    *between.light.noise_fraction *= std::pow(kBelow * wanted / measured, 1.0 / std::max(slope, 0.1));
+    if (*between.light.noise_fraction > 1.05 * *holds->light.noise_fraction &&
+        *between.light.noise_fraction < *coarser->light.noise_fraction) {
+      between.words = paths_in_words(*between.light.noise_fraction) + parts.exact_words;
       BenchPoint point;
       between =
           try_light(parts, *parts.own_truth, parts.device, parts.own_gel, between, parts.settings.seed + 4, point);
@@ -154,6 +154,7 @@ WholeSeconds whole_seconds(const BenchParts& parts, double edges, const LightSet
     const auto pictures = static_cast<double>(parts.truth->runs[0].electrons.size());
     sim::SceneSpec scene = bench_scene(parts.whole_device, parts.presses, parts.presses.specs.front(), 1);
     scene.effects = light.effects;
+    scene.accuracy = light.accuracy;
     // Where pixels share their light a whole picture takes far less than the middle says, which has the contact's edge.
     seconds.by_middle = !sim::make_plan(scene).shared_paths && pictures * times * light.each_s > kMostWholeSeconds;
   }
@@ -163,6 +164,7 @@ WholeSeconds whole_seconds(const BenchParts& parts, double edges, const LightSet
   if (!parts.truth) scene.outputs = {.frames = false};
   scene.light = light.light;
   scene.effects = light.effects;
+  scene.accuracy = light.accuracy;
   const SceneRun run = run_scene(scene, made.gel);
   seconds.once = made.seconds + run.camera_seconds;
   seconds.frame = run.mechanics_seconds + (seconds.by_middle ? times : 1.0) * run.picture_seconds;
@@ -258,8 +260,8 @@ BenchChoice cheapest_choice(const BenchParts& parts, BenchCurve& mesh, const std
       }
       picked = finer;
     } else {
-      light->light.noise_fraction *= kMoreExact;
-      light->words = paths_in_words(light->light.noise_fraction) + parts.exact_words;
+      *light->light.noise_fraction *= kMoreExact;
+      light->words = paths_in_words(*light->light.noise_fraction) + parts.exact_words;
     }
     choice.remark_rounds.push_back(
         fmt::format("{} didn't hold on other presses ({:.2g} %{})", found, 100.0 * verified.force,

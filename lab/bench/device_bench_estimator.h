@@ -86,6 +86,6 @@ EstimatorBench bench_estimator(const EstimatorDevice& of, const EstimatorSetting
 std::vector<double> more_errors(const EstimatorRow& row, const EstimatorRow& reference);
 
 /// The part of bench.md, with the plots' files that it names.
-std::string estimator_page(const EstimatorBench& bench, std::vector<StudyFile>& files);
+std::string estimator_page(const EstimatorBench& bench, const std::string& device, std::vector<StudyFile>& files);
 
 }  // namespace touchstone::lab

@@ -156,10 +156,12 @@ plots::LinePlot plot_of_counts(const EstimatorBench& bench) {
 
 }  // namespace
 
-std::string estimator_page(const EstimatorBench& bench, std::vector<StudyFile>& files) {
+std::string estimator_page(const EstimatorBench& bench, const std::string& device, std::vector<StudyFile>& files) {
   std::string text = "## What the estimator feels\n\n";
   if (!bench.none.empty()) return text + fmt::format("No estimator is measured for this device: {}.\n", bench.none);
   const std::size_t sets = bench.reference.errors.size();
+  const std::string rows = device + "-estimator.svg";
+  const std::string counts = device + "-estimator-frames.svg";
   text += fmt::format(
       "- Estimator: {}.\n- Test: {}. Root mean square of what is estimated: {:.3g} {}.\n- Each row: {} training sets "
       "of "
@@ -169,13 +171,13 @@ std::string estimator_page(const EstimatorBench& bench, std::vector<StudyFile>& 
       "single "
       "runs, without the truth of pixels. All of this took {:.0f} s.\n\n",
       bench.training, bench.test, bench.typical, bench.unit, sets, bench.seconds);
-  text += sentences(bench) + "\n![Error against seconds](bench-estimator.svg)\n\n" + table_head(bench);
+  text += sentences(bench) + fmt::format("\n![Error against seconds]({})\n\n", rows) + table_head(bench);
   text += line_of(bench, bench.reference, true);
   for (const EstimatorRow& row : bench.rows) text += line_of(bench, row, false);
-  text += "\n![Error against the number of training frames](bench-estimator-frames.svg)\n\n" + table_head(bench);
+  text += fmt::format("\n![Error against the number of training frames]({})\n\n", counts) + table_head(bench);
   for (const EstimatorRow& row : bench.counts) text += line_of(bench, row, row.frames == bench.reference.frames);
-  files.push_back({"bench-estimator.svg", plots::to_svg(plot_of_rows(bench))});
-  files.push_back({"bench-estimator-frames.svg", plots::to_svg(plot_of_counts(bench))});
+  files.push_back({rows, plots::to_svg(plot_of_rows(bench))});
+  files.push_back({counts, plots::to_svg(plot_of_counts(bench))});
   return text;
 }
 

@@ -262,11 +262,12 @@ LightSetting try_light(const BenchParts& parts, const TruePictures& truth, const
                        const fem::Compliance& gel, LightSetting one, std::uint64_t seed, BenchPoint& point) {
   point.setting = one.words;
   point.series = one.adaptive_paths ? "paths" : one.words;
-  point.value = one.adaptive_paths ? one.light.noise_fraction : kUnknown;
+  point.value = one.adaptive_paths ? *one.light.noise_fraction : kUnknown;
   try {
     sim::SceneSpec scene = bench_scene(device, parts.presses, truth.spec, seed);
     scene.light = one.light;
     scene.effects = one.effects;
+    scene.accuracy = one.accuracy;
     const SceneRun run = run_scene(scene, gel);
     add_run(run, point);
     point.pixel_error = pixel_error(run, truth.runs, truth.imager);

@@ -83,6 +83,7 @@ struct LightSetting {
   std::string words;
   sim::LightSpec light;
   sim::EffectSwitches effects;
+  std::optional<sim::AccuracySpec> accuracy = {};
   bool adaptive_paths = false;  ///< light.noise_fraction may be chosen between those tried
   double pixel_error = kUnknown;
   double once_s = kUnknown, each_s = kUnknown;

@@ -68,17 +68,19 @@ PlannedBench planned_bench(const BenchParts& parts, const Progress& progress) {
   std::optional<TruePictures> truth;
   if (parts.truth)
     truth = true_pictures(other, parts.finest_device, parts.finest_gel, spec, parts.settings.seed + 2002);
-  const auto add = [&](const char* name, const sim::Plan& plan, const sim::EffectSwitches& switches) {
+  const auto add = [&](const char* name, const sim::Plan& plan, const std::optional<sim::AccuracySpec>& accuracy,
+                       const sim::EffectSwitches& switches) {
     PlannedWay way;
     way.name = name;
     way.effects = effects_in_words(plan);
     LightSetting light;
     light.effects = switches;
+    light.accuracy = accuracy;
     if (truth) {
       BenchPoint ignored;
       light = try_light(other, *truth, parts.device, parts.own_gel, light, parts.settings.seed + 2003, ignored);
       way.pixel_error = light.pixel_error;
-      way.note = std::isfinite(light.pixel_error) ? "" : ignored.note;
+      (std::isfinite(light.pixel_error) ? way.light : way.note) = ignored.note;
     }
     if (!truth || std::isfinite(light.pixel_error)) {
       const WholeSeconds seconds = whole_seconds(parts, 1.0, light);
@@ -90,12 +92,12 @@ PlannedBench planned_bench(const BenchParts& parts, const Progress& progress) {
   };
   sim::EffectSwitches shares;
   shares.elasticity = sim::Elasticity::linear;
-  add("by fixed shares", by_shares, shares);
+  add("by fixed shares", by_shares, {}, shares);
   tell(3);
   for (const sim::SwitchedEffect& one : kOfPictures) {
     shares.*one.of = by_need.*one.planned ? sim::Switch::on : sim::Switch::off;
   }
-  add("by need", by_need, shares);
+  add("by need", by_need, stated.accuracy, shares);
   return bench;
 }
 
@@ -120,6 +122,7 @@ std::string planned_page(const DeviceBench& all) {
   row("once, s", "", [&](const PlannedWay& way) { return number(way.once_s); });
   row(fmt::format("a frame, s{}", bench.by_middle ? " (from the middle, by the number of pixels)" : ""), "",
       [&](const PlannedWay& way) { return number(way.frame_s); });
+  row("light", "", [&](const PlannedWay& way) { return way.light; });
   row("effects", "", [&](const PlannedWay& way) { return way.effects; });
   return text + fmt::format("\nLeaving out changes: {}.\n", bench.needs);
 }

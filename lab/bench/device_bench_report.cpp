@@ -12,6 +12,7 @@
 #include "datasets/sets/processor.h"
 #include "lab/bench/device_bench.h"
 #include "plots/line_plot.h"
+#include "sim/scene/light_limits.h"
 
 namespace touchstone::lab {
 namespace {
@@ -193,8 +194,9 @@ std::string choice_in_words(const DeviceBench& bench) {
   text += fmt::format("mesh: {{fine_mm: {:.4g}, coarse_mm: {:.4g}}}\n```\n", choice.fine_mm, choice.coarse_mm);
   if (!choice.light_words.empty()) {
     text += "\nIn scenes:\n\n```yaml\n";
-    text += fmt::format("light: {{noise_fraction: {:.3g}, max_samples: {}}}\n", choice.light.noise_fraction,
-                        choice.light.max_samples);
+    text += fmt::format("light: {{noise_fraction: {:.3g}, max_samples: {}}}\n",
+                        choice.light.noise_fraction.value_or(sim::LightLimits{}.noise_fraction),
+                        choice.light.max_samples.value_or(sim::LightLimits{}.max_samples));
     std::string switches;
     const auto add = [&](const char* name, sim::Switch one) {
       if (one != sim::Switch::automatic)
@@ -254,7 +256,7 @@ StudyResult report(const DeviceBench& bench, const std::string& text) {
   StudyResult result;
   if (bench.settings.estimator.alone) {
     std::string page = fmt::format("# What accuracy costs: {}\n\n", bench.device);
-    page += estimator_page(bench.estimator.value(), result.files);
+    page += estimator_page(bench.estimator.value(), file_name(bench.device), result.files);
     page +=
         fmt::format("\nMachine: {}, {} threads.\n", datasets::processor_kind(), std::thread::hardware_concurrency());
     result.files.insert(result.files.begin(), {"bench.md", page});
@@ -287,7 +289,7 @@ StudyResult report(const DeviceBench& bench, const std::string& text) {
     return result;
   }
   page += planned + "\n## Effects\n\n" + effects_table(bench);
-  if (bench.estimator) page += "\n" + estimator_page(*bench.estimator, result.files);
+  if (bench.estimator) page += "\n" + estimator_page(*bench.estimator, file_name(bench.device), result.files);
   result.files.insert(result.files.begin(), {"bench.md", page});
   result.files.push_back({"bench.csv", csv_of(bench)});
   if (const std::string device = with_mesh(text, bench); !device.empty()) {

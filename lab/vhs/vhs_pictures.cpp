@@ -14,7 +14,6 @@
 #include "sim/press/truth.h"
 #include "sim/scene/device_camera.h"
 #include "sim/scene/device_faces.h"
-#include "sim/scene/device_imager.h"
 #include "sim/scene/scene.h"
 #include "sim/sensor/virtual_camera.h"
 #include "sim/view/visible_scene.h"
@@ -25,8 +24,7 @@ std::vector<VhsPicture> vhs_pictures(sim::SceneSpec scene, const std::vector<int
                                      const std::filesystem::path& cache, const Progress& progress) {
   // VirtualCamera renders its first frame with four times as many paths.
   constexpr int kFirstFrame = 4;
-  scene.light.max_samples = std::max(1, paths / kFirstFrame);
-  scene.light.min_samples = scene.light.max_samples;
+  scene.light.max_samples = scene.light.min_samples = std::max(1, paths / kFirstFrame);
   scene.effects.shared_paths = sim::Switch::off;  // colours and divisions are read by means over pixels of their own
   scene.outputs = {};
   scene.outputs.radiance = true;

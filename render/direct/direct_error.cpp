@@ -52,7 +52,7 @@ double square_error_of(const DirectError& error) {
 }
 
 constexpr double kStandardErrors = 2.0;
-constexpr int kMorePaths = 4;
+constexpr std::array kTimesThePaths = {1, 4, 16};  // the last one of what is seen alone
 
 }  // namespace
 
@@ -64,7 +64,11 @@ double smallest_rms(const DirectError& error) {
   return std::sqrt(std::max(0.0, error.rms * error.rms - kStandardErrors * square_error_of(error)));
 }
 
-DirectError direct_error_beside(const std::array<cv::Mat, 2>& traced, const cv::Mat& picture, const cv::Mat& mask) {
+namespace {
+
+/// In parts of the traced pictures' root mean square, or in their own unit.
+DirectError error_beside(const std::array<cv::Mat, 2>& traced, const cv::Mat& picture, const cv::Mat& mask,
+                         bool in_parts) {
   const int bands = picture.channels();
   std::vector<double> products;
   std::vector<double> differences;
@@ -88,7 +92,7 @@ DirectError direct_error_beside(const std::array<cv::Mat, 2>& traced, const cv::
       powers.push_back(power);
     }
   }
-  const double power = mean_of(powers).value;
+  const double power = in_parts ? mean_of(powers).value : 1.0;
   const Mean square = mean_of(products);
   const Mean shift = mean_of(differences);
   DirectError error;
@@ -106,6 +110,16 @@ DirectError direct_error_beside(const std::array<cv::Mat, 2>& traced, const cv::
   return error;
 }
 
+}  // namespace
+
+DirectError direct_error_beside(const std::array<cv::Mat, 2>& traced, const cv::Mat& picture, const cv::Mat& mask) {
+  return error_beside(traced, picture, mask, true);
+}
+
+DirectError plain_error_beside(const std::array<cv::Mat, 2>& traced, const cv::Mat& picture, const cv::Mat& mask) {
+  return error_beside(traced, picture, mask, false);
+}
+
 namespace {
 
 /// A scene's pixels by paths, traced when first asked for: pictures of several renderers stand beside them.
@@ -120,15 +134,22 @@ class Reference {
   }
 
   /// Beside so many times the paths of the settings.
-  DirectError error_of(const cv::Mat& picture, int times) {
-    std::array<cv::Mat, 2>& traced = traced_[times];
-    if (traced[0].empty()) {
-      traced = trace_twice(scene_, camera_, mask_, times * settings_.samples, settings_.max_depth, settings_.seed);
-    }
-    return direct_error_beside(traced, picture, mask_);
+  DirectError error_of(const cv::Mat& picture, int times) { return direct_error_beside(traced(times), picture, mask_); }
+  /// The same as it is seen. @pre the settings say how
+  DirectError seen_error_of(const cv::Mat& picture, int times) {
+    const std::array<cv::Mat, 2>& both = traced(times);
+    return plain_error_beside({settings_.seen(both[0]), settings_.seen(both[1])}, settings_.seen(picture), mask_);
   }
 
  private:
+  const std::array<cv::Mat, 2>& traced(int times) {
+    std::array<cv::Mat, 2>& both = traced_[times];
+    if (both[0].empty()) {
+      both = trace_twice(scene_, camera_, mask_, times * settings_.samples, settings_.max_depth, settings_.seed);
+    }
+    return both;
+  }
+
   const Scene& scene_;
   const Camera& camera_;
   DirectErrorSettings settings_;
@@ -204,18 +225,24 @@ DirectChoice choose_direct(const Scene& rest, const Scene& first, const Camera& 
       renderer->set_bounced_light(choice.bounced, rest);
     }
     const cv::Mat picture = renderer->render(first).irradiance;
-    choice.error = reference.error_of(picture, 1);
-    const auto is_open = [&] {
-      return largest_rms(choice.error) > settings.tolerance && smallest_rms(choice.error) < settings.tolerance;
-    };
-    if (!whatever && is_open()) choice.error = reference.error_of(picture, kMorePaths);
-    if (whatever || largest_rms(choice.error) <= settings.tolerance) {
+    DirectError deciding;
+    for (const int times : kTimesThePaths) {
+      if (times == kTimesThePaths.back() && !settings.error.seen) break;
+      choice.error = deciding = reference.error_of(picture, times);
+      if (settings.error.seen) choice.seen_error = deciding = reference.seen_error_of(picture, times);
+      const bool open = largest_rms(deciding) > settings.tolerance && smallest_rms(deciding) < settings.tolerance;
+      if (whatever || !open) break;
+    }
+    if (whatever || largest_rms(deciding) <= settings.tolerance) {
       choice.renderer = std::move(renderer);
       break;
     }
   }
   choice.field = std::move(field);
-  if (!choice.renderer) {
+  if (!choice.renderer && choice.seen_error) {
+    choice.reason = fmt::format("the picture is {:.2f} +- {:.2f} off, {:.2f} are asked for", choice.seen_error->rms,
+                                choice.seen_error->rms_error, settings.tolerance);
+  } else if (!choice.renderer) {
     choice.reason = fmt::format("the picture is {:.2f} +- {:.2f} % off, {:.2f} % are asked for", 100 * choice.error.rms,
                                 100 * choice.error.rms_error, 100 * settings.tolerance);
   }

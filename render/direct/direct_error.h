@@ -3,8 +3,10 @@
 
 #include <Eigen/Geometry>
 #include <array>
+#include <functional>
 #include <memory>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +21,9 @@ struct DirectErrorSettings {
   int samples = 64;    ///< paths a pixel, twice; choose_direct takes four times as many where these aren't enough
   int max_depth = 16;  ///< RenderSettings::max_depth
   std::uint64_t seed = 0;
+  /// What a picture (CV_32FC(bands)) is to whoever judges it, CV_32FC, for DirectChoice::seen_error: such as its
+  /// electrons in units of their noise.
+  std::function<cv::Mat(const cv::Mat&)> seen = {};
 };
 
 /// Parts of the picture's root mean square, each with its standard error.
@@ -42,13 +47,17 @@ DirectError measure_direct_error(const cv::Mat& picture, const Scene& scene, con
 /// The same of two pictures that are traced already (trace_twice), at the pixels that `mask` (CV_8UC1) has.
 /// @pre all are CV_32F of one size and as many channels
 DirectError direct_error_beside(const std::array<cv::Mat, 2>& traced, const cv::Mat& picture, const cv::Mat& mask);
+/// The same in the pictures' own unit, not in parts of their root mean square.
+DirectError plain_error_beside(const std::array<cv::Mat, 2>& traced, const cv::Mat& picture, const cv::Mat& mask);
 
 /// A renderer that has been found good enough, or the reason why there's none.
 struct DirectChoice {
   std::unique_ptr<DirectRenderer> renderer;  ///< null where direct light won't do; `reason` then says why
   std::string reason;
   DirectError error;  ///< of `first`, if it was drawn, with the last number of rays that was tried
-  int samples = 0;    ///< that number
+  /// The same as DirectErrorSettings::seen has it, in its unit, where that is given: it decides then.
+  std::optional<DirectError> seen_error;
+  int samples = 0;  ///< that number
   /// What the renderer was made of, for further ones that draw the same pictures: with the camera and `rest` without
   /// interreflection, and set_bounced_light with `rest`.
   LightField field;
@@ -57,7 +66,7 @@ struct DirectChoice {
 
 /// What choose_direct may choose, and how accurate it has to be.
 struct DirectChoiceSettings {
-  double tolerance = 0.015;  ///< of the root mean square difference: what largest_rms may be
+  double tolerance = 0.015;  ///< of the root mean square difference: what largest_rms may be, of the error that decides
   bool whatever = false;     ///< the error is measured, but any will do: of several numbers of rays the last
   DirectSettings direct;
   /// Rays a pixel that are tried in turn, in place of direct.samples, until the tolerance holds; empty: those alone.

@@ -10,6 +10,7 @@
 #include "sim/cost/work_clock.h"
 #include "sim/scene/device_camera.h"
 #include "sim/scene/device_imager.h"
+#include "sim/scene/light_limits.h"
 #include "sim/sensor/direct_light.h"
 #include "sim/sensor/key_frames.h"
 #include "sim/sensor/picture_settings.h"
@@ -174,7 +175,8 @@ class Look {
     const double made_s = seen_s_ + making.seconds();
     render::RenderSettings settings = picture_settings(view_.scene, response_);
     // Moments have noise of their own, which is averaged.
-    settings.noise = noise_target(response_, view_.scene.light.noise_fraction * std::sqrt(std::max(1.0, moments_ - 1)));
+    settings.noise =
+        noise_target(response_, light_limits(view_.scene).noise_fraction * std::sqrt(std::max(1.0, moments_ - 1)));
     const double a_pixel = pixel_s(tracer, settings);
     if (view_.plan.scattering) {
       found.moment_s = made_s + a_pixel * size_.area();

@@ -7,9 +7,19 @@
 
 namespace touchstone::sim {
 
+double strongest_force(const fem::PressState& state) {
+  double most = 0.0;
+  for (const fem::BodyState& body : state.bodies) most = std::max(most, body.wrench.head<3>().norm());
+  return most;
+}
+
 std::vector<int> hard_frames(std::span<const Truth> truths) {
-  const auto force = [](const Truth& truth) { return truth.press.wrench.head<3>().norm(); };
-  const auto shear = [](const Truth& truth) { return truth.press.wrench.head<2>().norm(); };
+  const auto force = [](const Truth& truth) { return strongest_force(truth.press); };
+  const auto shear = [](const Truth& truth) {
+    double most = 0.0;
+    for (const fem::BodyState& body : truth.press.bodies) most = std::max(most, body.wrench.head<2>().norm());
+    return most;
+  };
   int strongest = -1;
   int sheared = -1;
   int last = -1;

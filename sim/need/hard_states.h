@@ -12,8 +12,11 @@
 
 namespace touchstone::sim {
 
-/// Frames, rising: the one whose force is largest, the one that is sheared most, and the last one that touches. None
-/// where nothing touches.
+/// N, of the object that is pressed most.
+double strongest_force(const fem::PressState& state);
+
+/// Frames, rising: the one in which an object's force is largest, the one in which one is sheared most, and the last
+/// one that touches. None where nothing touches.
 std::vector<int> hard_frames(std::span<const Truth> truths);
 
 /// The motion's truth as `plan` has it, quasi-static.

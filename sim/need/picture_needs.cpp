@@ -13,6 +13,7 @@
 #include "sim/scene/device_imager.h"
 #include "sim/sensor/background_light.h"
 #include "sim/sensor/colour_numbers.h"
+#include "sim/sensor/photocurrent.h"
 #include "sim/view/pixel_truth.h"
 #include "sim/view/scene_view.h"
 
@@ -49,32 +50,65 @@ cv::Mat looked_at(const SceneView& view, const render::Camera& camera, const fem
   return mask;
 }
 
-/// Mean electrons of a state, from each of two sets of random numbers.
+/// Of a state, from each of two sets of random numbers.
 using TwoPictures = std::array<cv::Mat, 2>;
 
-/// Of a device with a background with what that adds where nothing is pressed, as the sensor's own pictures: it gives
-/// back most of what an effect makes of the untouched unit, so that much less than its whole light is left to change.
-TwoPictures pictures_of(const SceneView& view, const render::Camera& camera, const fem::PressState& press,
-                        const cv::Mat& mask, int paths, const std::vector<render::ImagerResponse>& responses) {
+/// What a scene's cameras get of a state. Without events asked for, `contrast` is empty, without pictures `electrons`.
+struct SeenState {
+  TwoPictures electrons;  ///< mean
+  TwoPictures contrast;   ///< log of the photocurrent over that of the untouched gel
+};
+
+/// Of a device with a background the electrons have what that adds where nothing is pressed, as the sensor's own
+/// pictures: it gives back most of what an effect makes of the untouched unit, so that much less than its whole light
+/// is left to change.
+SeenState seen_state(const SceneView& view, const render::Camera& camera, const fem::PressState& press,
+                     const cv::Mat& mask, int paths, const std::vector<render::ImagerResponse>& responses) {
   const render::Tracer tracer = view.tracer(press);
   const cv::Mat& background = view.scene.device.background;
+  const bool events = view.scene.outputs.events;
   std::optional<render::Tracer> rest;
-  if (!background.empty()) rest.emplace(view.seen(at_rest(press), {}));
+  if (events || !background.empty()) rest.emplace(view.seen(at_rest(press), {}));
   const render::Imager ideal = imager(view.scene.device, view.plan.bands, false);
+  const Photocurrents currents(view.scene.device, view.plan.bands);
   render::RenderSettings settings;
   settings.min_samples = settings.max_samples = paths;
-  TwoPictures pictures;
-  for (std::size_t k = 0; k < pictures.size(); ++k) {
+  SeenState seen;
+  for (std::size_t k = 0; k < seen.electrons.size(); ++k) {
     settings.seed = view.scene.seed + k * kOtherSeed;
     cv::Mat light = tracer.render(camera, settings, mask).irradiance;
-    if (rest) {
-      const cv::Mat missing = missing_at_rest(background, rest->render(camera, settings, mask).irradiance, ideal);
-      light = with_numbers(light, missing, irradiance_per_number(ideal));
+    const cv::Mat untouched = rest ? rest->render(camera, settings, mask).irradiance : cv::Mat();
+    if (events) {
+      const auto& pixels = view.scene.device.camera->events.value().pixels;
+      seen.contrast[k] = currents.log_of(light, pixels) - currents.log_of(untouched, pixels);
     }
-    pictures[k] = render::mean_electrons(light, responses);
+    if (!view.scene.outputs.light()) continue;
+    if (!background.empty()) {
+      light = with_numbers(light, missing_at_rest(background, untouched, ideal), irradiance_per_number(ideal));
+    }
+    seen.electrons[k] = render::mean_electrons(light, responses);
   }
-  return pictures;
+  return seen;
 }
+
+/// Adds up squares of changes of contrast, and of the contrast. Sums of two sets of random numbers have no noise in
+/// the mean.
+struct ContrastSum {
+  double changed = 0.0;
+  double all = 0.0;
+
+  void add(const TwoPictures& one, const TwoPictures& other, const cv::Mat& mask) {
+    for (int row = 0; row < mask.rows; ++row) {
+      for (int column = 0; column < mask.cols; ++column) {
+        if (mask.at<std::uint8_t>(row, column) == 0) continue;
+        const auto at = [&](const cv::Mat& picture) { return static_cast<double>(picture.at<float>(row, column)); };
+        changed += (at(one[0]) - at(other[0])) * (at(one[1]) - at(other[1]));
+        all += 0.5 * (at(one[0]) * at(one[1]) + at(other[0]) * at(other[1]));
+      }
+    }
+  }
+  double percent() const { return all > 0.0 ? 100.0 * std::sqrt(std::max(0.0, changed) / all) : 0.0; }
+};
 
 /// Adds up squares of differences over the noise.
 struct NoiseSum {
@@ -121,26 +155,30 @@ void add_picture_needs(const SceneSpec& scene, const Plan& plan, const fem::Comp
   const std::vector<render::ImagerResponse> responses =
       render::channel_responses(imager(scene.device, plan.bands, true));
   std::vector<cv::Mat> masks;
-  std::vector<TwoPictures> planned;
+  std::vector<SeenState> planned;
   for (const int k : frames) {
     const fem::PressState& press = truths[static_cast<std::size_t>(k)].press;
     masks.push_back(looked_at(view, camera, press, settings.pixels));
-    planned.push_back(pictures_of(view, camera, press, masks.back(), settings.paths, responses));
+    planned.push_back(seen_state(view, camera, press, masks.back(), settings.paths, responses));
   }
   for (const SwitchedEffect& one : kSeenEffects) {
-    const std::optional<SwitchedScene> other = switched(scene, plan, one);
-    if (!other) continue;
+    const std::optional<SwitchedScene> way = switched(scene, plan, one);
+    if (!way) continue;
     EffectNeed need{one.name, {}, {}};
     try {
-      const SceneView turned(other->scene, other->plan, gel, view);
-      const render::Camera seen_by = planned_camera(other->scene, other->plan);
+      const SceneView turned(way->scene, way->plan, gel, view);
+      const render::Camera seen_by = planned_camera(way->scene, way->plan);
       NoiseSum sum;
+      ContrastSum contrast;
       for (std::size_t k = 0; k < frames.size(); ++k) {
         const fem::PressState& press = truths[static_cast<std::size_t>(frames[k])].press;
-        sum.add(planned[k], pictures_of(turned, seen_by, press, masks[k], settings.paths, responses), masks[k],
-                responses);
+        const SeenState other = seen_state(turned, seen_by, press, masks[k], settings.paths, responses);
+        if (scene.outputs.light()) sum.add(planned[k].electrons, other.electrons, masks[k], responses);
+        if (scene.outputs.events) contrast.add(planned[k].contrast, other.contrast, masks[k]);
       }
-      need.change.emplace().pixel_noise = sum.root();
+      need.change.emplace();
+      if (scene.outputs.light()) need.change->pixel_noise = sum.root();
+      if (scene.outputs.events) need.change->event_percent = contrast.percent();
       const SceneView& fine = plan.fine_relief ? view : turned;
       if (one.planned == &Plan::fine_relief && (scene.device.coating || scene.outputs.height)) {
         double most = 0.0;

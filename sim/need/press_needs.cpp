@@ -52,9 +52,12 @@ class PressComparison {
   }
 
   void add(const Pair& pair, double largest_force) {
-    const auto force = [](const fem::PressState& state) { return Eigen::Vector3d(state.wrench.head<3>()); };
-    const double size = std::max(force(pair.with).norm(), kLeastForce * largest_force);
-    if (size > 0.0) raise(change_.force_percent, 100.0 * (force(pair.with) - force(pair.without)).norm() / size);
+    for (std::size_t b = 0; b < pair.with.bodies.size(); ++b) {
+      const Eigen::Vector3d with = pair.with.bodies[b].wrench.head<3>();
+      const Eigen::Vector3d without = pair.without.bodies[b].wrench.head<3>();
+      const double size = std::max(with.norm(), kLeastForce * largest_force);
+      if (size > 0.0) raise(change_.force_percent, 100.0 * (with - without).norm() / size);
+    }
     if (heights_) {
       const auto rise = pair.with.surface_displacement.col(2) - pair.without.surface_displacement.col(2);
       raise(change_.height_um, 1e3 * rise.cwiseAbs().maxCoeff());
@@ -89,11 +92,11 @@ constexpr SwitchedEffect kPlayed[] = {
     {"elastic object", &EffectSwitches::elastic_object, &Plan::elastic_object},
 };
 
-/// Gives the device a mesh that is fine where `hardest` touches alone: for a press that is about the strain there. With
-/// `edges` of 1 it stays as it is. @returns where the object stands: of a slab, where one place is as good as another,
-/// over its middle
-RigidTransform cut_to_contact(DeviceSpec& device, const fem::PressState& hardest, double edges) {
-  RigidTransform pose = hardest.bodies.front().gel_from_object;
+/// Gives the device a mesh that is fine where the object touches alone: for a press that is about the strain there.
+/// With `edges` of 1 it stays as it is. @returns where the object stands: of a slab, where one place is as good as
+/// another, over its middle
+RigidTransform cut_to_contact(DeviceSpec& device, const fem::BodyState& hardest, double edges) {
+  RigidTransform pose = hardest.gel_from_object;
   if (edges <= 1.0) return pose;
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   const double contact = std::sqrt(hardest.contact_area / kPi);
@@ -122,9 +125,16 @@ Change scaled(Change change, double factor) {
   return change;
 }
 
+void raise_to(Change& change, const Change& other) {
+  for (const ChangeUnit& unit : kChangeUnits) {
+    const std::optional<double>& amount = other.*unit.changed;
+    if (amount) change.*unit.changed = std::max((change.*unit.changed).value_or(0.0), *amount);
+  }
+}
+
 double largest_force(std::span<const Truth> truths) {
   double largest = 0.0;
-  for (const Truth& truth : truths) largest = std::max(largest, truth.press.wrench.head<3>().norm());
+  for (const Truth& truth : truths) largest = std::max(largest, strongest_force(truth.press));
   return largest;
 }
 
@@ -161,44 +171,65 @@ void add_played_needs(const SceneSpec& scene, const Plan& plan, const fem::Compl
   }
 }
 
+namespace {
+
+/// What finite strain changes of one object's press. Where there's no answer, `note` says why. @throws Error likewise
+std::optional<Change> finite_strain_change(const SceneSpec& scene, const fem::PressBody& object,
+                                           const fem::BodyState& hardest, double edges, std::string& note) {
+  SceneSpec coarse = scene;
+  const RigidTransform pose = cut_to_contact(coarse.device, hardest, edges);
+  const std::vector<fem::ElasticMaterial> materials = gel_materials(coarse.device.gel);
+  const std::vector<fem::Bead> beads = gel_beads(coarse.device);
+  const fem::GelBody body = gel_body(coarse.device);
+  const fem::TetMesh mesh = fem::mesh_gel(body);
+  const fem::Compliance linear_gel = fem::compute_compliance(mesh, materials, beads, fem::thickness_of(body));
+  const fem::FiniteGel finite_gel(mesh, materials, beads, fem::thickness_of(body));
+  // Both with whole hats, so that they differ by what the strain makes of them alone.
+  fem::PressTolerance tolerance;
+  tolerance.outlines = false;
+  fem::Press linear(linear_gel, std::vector{object}, tolerance);
+  tolerance.most_factorisations = kMostFactorisations;
+  fem::FinitePress finite(finite_gel, object, tolerance);
+  const std::optional<RigidTransform> touching = finite.touching(pose);
+  if (!touching) fail("the object isn't over the gel");
+  std::optional<Change> change;
+  for (const double part : kStages) {
+    RigidTransform next = pose;
+    next.translation += (1.0 - part) * (touching->translation - pose.translation);
+    try {
+      linear.step(target_at(next));
+      finite.step(target_at(next));
+    } catch (const Error& error) {
+      note = error.what();
+      break;
+    }
+    PressComparison comparison(coarse, linear_gel);
+    comparison.add({finite.state(), linear.state()}, 0.0);
+    change = scaled(comparison.change(), 1.0 / part);
+  }
+  return change;
+}
+
+}  // namespace
+
 void add_finite_strain_need(const SceneSpec& scene, const Plan& plan, const Truth& hardest, double edges,
                             const std::filesystem::path& cache, SceneNeeds& needs) {
-  if (!scene.more_objects.empty() || scene.device.mesh.force_error) return;
+  if (scene.device.mesh.force_error) return;
   EffectNeed need{"finite strain", {}, {}};
   try {
-    SceneSpec coarse = scene;
-    const RigidTransform pose = cut_to_contact(coarse.device, hardest.press, edges);
-    const std::vector<fem::ElasticMaterial> materials = gel_materials(coarse.device.gel);
-    const std::vector<fem::Bead> beads = gel_beads(coarse.device);
-    const fem::GelBody body = gel_body(coarse.device);
-    const fem::TetMesh mesh = fem::mesh_gel(body);
-    const fem::Compliance linear_gel = fem::compute_compliance(mesh, materials, beads, fem::thickness_of(body));
-    const fem::FiniteGel finite_gel(mesh, materials, beads, fem::thickness_of(body));
-    fem::PressBody object;
-    object.shape = coarse_contact_shape(scene.object, coarse.device.mesh.fine_mm);
-    object.friction = plan.friction ? scene.object.friction : 0.0;
-    if (plan.elastic_object) object.elastic = set_up_elastic_objects(scene, plan, cache).front();
-    // Both with whole hats, so that they differ by what the strain makes of them alone.
-    fem::PressTolerance tolerance;
-    tolerance.outlines = false;
-    fem::Press linear(linear_gel, std::vector{object}, tolerance);
-    tolerance.most_factorisations = kMostFactorisations;
-    fem::FinitePress finite(finite_gel, object, tolerance);
-    const std::optional<RigidTransform> touching = finite.touching(pose);
-    if (!touching) fail("the object isn't over the gel");
-    for (const double part : kStages) {
-      RigidTransform next = pose;
-      next.translation += (1.0 - part) * (touching->translation - pose.translation);
-      try {
-        linear.step(target_at(next));
-        finite.step(target_at(next));
-      } catch (const Error& error) {
-        need.note = error.what();
-        break;
-      }
-      PressComparison comparison(coarse, linear_gel);
-      comparison.add({finite.state(), linear.state()}, 0.0);
-      need.change = scaled(comparison.change(), 1.0 / part);
+    const auto elastic = set_up_elastic_objects(scene, plan, cache);
+    const std::vector<MovedObject> objects = moved_objects(scene);
+    for (std::size_t b = 0; b < objects.size(); ++b) {
+      const fem::BodyState& state = hardest.press.bodies[b];
+      if (state.contact_vertices == 0) continue;
+      fem::PressBody object;
+      object.shape = coarse_contact_shape(objects[b].object, scene.device.mesh.fine_mm);
+      object.friction = plan.friction ? objects[b].object.friction : 0.0;
+      if (plan.elastic_object) object.elastic = elastic[b];
+      const std::optional<Change> change = finite_strain_change(scene, object, state, edges, need.note);
+      if (!change) continue;
+      if (!need.change) need.change.emplace();
+      raise_to(*need.change, *change);
     }
     if (need.change) need.note.clear();
   } catch (const Error& error) {

@@ -19,8 +19,9 @@ void add_played_needs(const SceneSpec& scene, const Plan& plan, const fem::Compl
                       std::span<const Truth> truths, std::span<const int> frames, const std::filesystem::path& cache,
                       SceneNeeds& needs);
 
-/// Finite strain: the scene's object, led to its pose in `hardest` from where it just touches above or below it, by
-/// both theories on one mesh (see NeedSettings::finite_edges). An elastic object's own compliance is in the cache.
+/// Finite strain: each object that touches in `hardest`, alone, led to its pose there from where it just touches above
+/// or below it, by both theories on one mesh (see NeedSettings::finite_edges); the largest changes. An elastic object's
+/// own compliance is in the cache.
 void add_finite_strain_need(const SceneSpec& scene, const Plan& plan, const Truth& hardest, double edges,
                             const std::filesystem::path& cache, SceneNeeds& needs);
 

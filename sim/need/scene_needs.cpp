@@ -18,7 +18,7 @@ namespace {
 using nlohmann::json;
 
 /// Raised with each change of how needs are measured, or of their file.
-constexpr int kNeedFormat = 4;
+constexpr int kNeedFormat = 5;
 
 std::string text_of(const SceneNeeds& needs) {
   json all = json::array();
@@ -104,8 +104,8 @@ SceneNeeds measure_needs(const SceneSpec& wanted, const fem::Compliance& gel, co
   stage(2);
   if (!plan.finite_strain && settings.finite_edges > 0.0) {
     const auto weaker = [&](int a, int b) {
-      return truths[static_cast<std::size_t>(a)].press.wrench.head<3>().norm() <
-             truths[static_cast<std::size_t>(b)].press.wrench.head<3>().norm();
+      return strongest_force(truths[static_cast<std::size_t>(a)].press) <
+             strongest_force(truths[static_cast<std::size_t>(b)].press);
     };
     const int strongest = *std::max_element(frames.begin(), frames.end(), weaker);
     add_finite_strain_need(scene, plan, truths[static_cast<std::size_t>(strongest)], settings.finite_edges, cache,

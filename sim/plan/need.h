@@ -16,6 +16,9 @@ struct Change {
   std::optional<double> pixel_noise;    ///< root mean square over pixels that see the contact and what is about it
   std::optional<double> marker_px;      ///< the largest: of beads, markers, and the surface where there are neither
   std::optional<double> height_um;      ///< the largest, of the gel's surface
+  /// Of the change of log light from the untouched gel to the states looked at, which is what events are: root mean
+  /// squares over the same pixels.
+  std::optional<double> event_percent;
 
   bool operator==(const Change&) const = default;
 };

@@ -97,9 +97,12 @@ void plan_elastic_objects(const SceneSpec& scene, Plan& plan, PlanTable& table) 
 
 /// What keeps a scene from being pressed at finite strain; nothing: it can be.
 std::string unfit_for_finite_strain(const SceneSpec& scene, const Plan& plan) {
-  if (!scene.more_objects.empty()) return "several objects";
   if (plan.elastic_object && plan.relaxation) return "an elastic object on a gel that relaxes";
-  if (scene.motion.is_turned()) return "motions led by torques";
+  const auto turned = [](const MovedObject& moved) { return moved.motion.is_turned(); };
+  const std::vector<MovedObject> objects = moved_objects(scene);
+  if (plan.relaxation && std::any_of(objects.begin(), objects.end(), turned)) {
+    return "motions led by torques on a gel that relaxes";
+  }
   if (plan.inertia) return "inertia";
   if (scene.device.mesh.force_error) return "a mesh that isn't given by fine_mm";
   return {};
@@ -233,8 +236,13 @@ void plan_relief(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   const bool fine = detail && *detail < kEdgesADetail * edge;
   // A coating shows each slope. On the gel's mesh a ball's contact ends on whole edges and what is free is averaged
   // over them: of edges of 0.5 mm under a ball of 4 mm the surface comes out 15 um and its slope 2 to 4 degrees off.
+  const std::string unfit_object = !plan.elastic_object ? ""
+                                   : plan.relaxation    ? "on a gel that relaxes"
+                                   : !scene.device.coating && scene.outputs.camera()
+                                       ? "that a camera sees through a clear gel"
+                                       : "";
   const bool shows_slopes = scene.device.coating && scene.outputs.camera() && is_gentle(scene.device.gel) &&
-                            scene.more_objects.empty() && !plan.elastic_object;
+                            scene.more_objects.empty() && unfit_object.empty();
   const std::string why =
       shows_slopes && !fine ? "a coating shows the surface's slope, which the gel's mesh has to some degrees only"
       : !detail             ? "the object's shape is smooth: the gel's mesh has all of it"
@@ -249,8 +257,9 @@ void plan_relief(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   if (plan.fine_relief && !scene.more_objects.empty()) {
     fail_at(scene.where, "fine relief isn't simulated with several objects; effects.fine_relief: off leaves it out");
   }
-  if (plan.fine_relief && plan.elastic_object) {
-    fail_at(scene.where, "fine relief isn't simulated with an elastic object; switch one of them off in effects");
+  if (plan.fine_relief && !unfit_object.empty()) {
+    fail_at(scene.where, "fine relief isn't simulated with an elastic object {}; switch one of them off in effects",
+            unfit_object);
   }
   if ((plan.fine_relief || scene.outputs.height) && !is_gentle(scene.device.gel)) {
     fail_at(scene.where, "{} is for flat and gently domed gels only (up to {:.3g} degrees of slope); {}{}",
@@ -500,6 +509,7 @@ Plan make_plan(const SceneSpec& scene, const SceneNeeds& needs) {
     plan_time(scene, plan, table);
     plan_diffraction(scene, plan, table);
     plan_direct_light(scene, plan, table);
+    plan_paths(scene, plan, table);
     plan_shared_paths(scene, plan, table);
   }
   for (const MovedObject& moved : moved_objects(scene)) {

@@ -1,6 +1,7 @@
 #include "sim/plan/plan_direct.h"
 
 #include "sim/scene/device_camera.h"
+#include "sim/scene/light_limits.h"
 
 namespace touchstone::sim {
 namespace {
@@ -76,13 +77,31 @@ void plan_direct_light(const SceneSpec& scene, Plan& plan, PlanTable& table) {
       !unfit.empty()
           ? unfit
           : fmt::format(
-                "an opaque coating, {}; {:.3g} % off path tracing is allowed, which is measured on "
+                "an opaque coating, {}; {} off path tracing is allowed, which is measured on "
                 "the deepest press before the first picture",
                 plan.interreflection ? "with the bounced light of the gel at rest" : "without interreflection",
-                100 * scene.light.direct_tolerance);
+                direct_limit_in_words(light_limits(scene)));
   plan.direct_light = table.add(name, forced, unfit.empty(), why,
                                 "in place of path tracing: some milliseconds a frame; once a scene a light field, its "
                                 "bounced light and the measurement");
+}
+
+void plan_paths(const SceneSpec& scene, const Plan& plan, PlanTable& table) {
+  const std::string name = "noise of paths";
+  if (!scene.outputs.light()) {
+    table.add(name, false, "no picture is asked for", "");
+    return;
+  }
+  const LightLimits limits = light_limits(scene);
+  const bool by_accuracy = table.accuracy() && !scene.light.noise_fraction;
+  table.add(name, true,
+            fmt::format("each pixel gets {} to {} paths, until it is uncertain by {:.2g} of the imager's noise{}{}",
+                        limits.min_samples, limits.max_samples, limits.noise_fraction,
+                        by_accuracy ? fmt::format(": half of the variance that {:.2g} of the noise allows",
+                                                  table.accuracy()->pixel_noise)
+                                    : "",
+                        plan.direct_light ? "; direct light has none" : ""),
+            "most of a traced picture's time");
 }
 
 void plan_shared_paths(const SceneSpec& scene, Plan& plan, PlanTable& table) {

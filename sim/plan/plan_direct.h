@@ -20,6 +20,10 @@ void plan_diffraction(const SceneSpec& scene, Plan& plan, PlanTable& table);
 /// @throws Error if the scene switches it on and is unfit
 void plan_direct_light(const SceneSpec& scene, Plan& plan, PlanTable& table);
 
+/// How many paths a pixel gets where pictures are traced (sim/scene/light_limits.h).
+/// @pre the row of direct light is made
+void plan_paths(const SceneSpec& scene, const Plan& plan, PlanTable& table);
+
 /// Do neighbouring pixels share their paths (render/paths/shared_paths.h), as they may behind a hole much wider than
 /// they are?
 /// @pre the row of direct light is made

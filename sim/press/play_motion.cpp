@@ -26,23 +26,22 @@ fem::PressTolerance press_tolerance() {
   return tolerance;
 }
 
-/// The press that the plan calls for: at finite strain of one body only.
+/// The press that the plan calls for.
 class PlannedPress {
  public:
   PlannedPress(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, std::vector<fem::PressBody> bodies,
                const fem::PronySeries& relaxation) {
     if (plan.finite_strain) {
-      TS_ASSERT(bodies.size() == 1);
       finite_gel_ = set_up_finite_gel(scene.device);
       TS_ASSERT(finite_gel_->rest.vertices == gel.vertices);
-      finite_.emplace(*finite_gel_, std::move(bodies.front()), fem::PressTolerance{}, relaxation);
+      finite_.emplace(*finite_gel_, std::move(bodies), fem::PressTolerance{}, relaxation);
     } else {
       linear_.emplace(gel, std::move(bodies), press_tolerance(), relaxation);
     }
   }
 
   const fem::PressState& step(std::span<const fem::PressTarget> targets) {
-    return finite_ ? finite_->step(targets.front()) : linear_->step(targets);
+    return finite_ ? finite_->step(targets) : linear_->step(targets);
   }
   const fem::PressState& state() const { return finite_ ? finite_->state() : linear_->state(); }
 

@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "fem/contact/press_part.h"
+#include "fem/contact/press_target.h"
 #include "fem/finite_strain/finite_press.h"
 #include "sim/press/gel_setup.h"
 #include "sim/press/press_path_file.h"

@@ -13,6 +13,7 @@ struct Accuracy {
   double pixel_noise = 1.0;    ///< of the imager's temporal noise in a pixel
   double marker_px = 0.05;     ///< of where something is seen
   double height_um = 5.0;      ///< of the gel's surface
+  double event_percent = 5.0;  ///< of the events that a change of light makes
 };
 
 /// A block `accuracy`: what isn't given there is taken from the device's, or is as above.
@@ -21,6 +22,7 @@ struct AccuracySpec {
   std::optional<double> pixel_noise;
   std::optional<double> marker_px;
   std::optional<double> height_um;
+  std::optional<double> event_percent;
   SourceLocation where;
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/named_file.h"
+#include "sim/scene/light_limits.h"
 
 namespace touchstone::sim {
 namespace {
@@ -57,8 +58,7 @@ void fields(YamlReader& in, OutputSpec& outputs) {
 void fields(YamlReader& in, LightSpec& light) {
   in.optional("noise_fraction", light.noise_fraction, Allowed::above(0.0));
   in.optional("max_samples", light.max_samples, Allowed::within(1, 1 << 20));
-  light.min_samples = std::min(light.min_samples, light.max_samples);
-  in.optional("min_samples", light.min_samples, Allowed::within(1, light.max_samples));
+  in.optional("min_samples", light.min_samples, Allowed::within(1, light.max_samples.value_or(kUsualMaxSamples)));
   in.optional("interreflection_tolerance", light.interreflection_tolerance, Allowed::within(0.0, 1.0));
   in.optional("motion_tolerance_px", light.motion_tolerance_px, Allowed::at_least(0.0));
   in.optional("change_tolerance", light.change_tolerance, Allowed::at_least(0.0));

@@ -41,20 +41,16 @@ struct OutputSpec {
   bool camera() const { return light() || first_hits() || events; }
 };
 
-/// How exact the light has to be.
+/// How exact the light has to be. What is left open here says sim/scene/light_limits.h.
 struct LightSpec {
-  double noise_fraction = 1.0;  ///< a pixel is sampled until its standard error is this part of the imager's noise
-  /// Before the first look at a pixel's error; 8 are judged by two blocks of 4, which are alike by luck where a pixel
-  /// has a print's edge: there pictures of the reflex device were 2.7 of the imager's noise off instead of 1 (of 32:
-  /// 0.7).
-  int min_samples = 32;
-  int max_samples = 64;
+  std::optional<double> noise_fraction;
+  std::optional<int> min_samples, max_samples;
+  std::optional<double> direct_tolerance;
   double interreflection_tolerance = 0.05;  ///< part of a surface's light that may be left out
   double motion_tolerance_px =
       0.3;  ///< image motion that needn't show as rolling shutter or, times the camera's own blur, as motion blur
-  double change_tolerance = 0.25;   ///< a pixel that changed by less than this part of the noise keeps its old light
-  double direct_tolerance = 0.015;  ///< RMS difference from path tracing that direct light may have, relative
-  double event_step = 0.5;          ///< of the smallest threshold: what event pixels may change by between two pictures
+  double change_tolerance = 0.25;  ///< a pixel that changed by less than this part of the noise keeps its old light
+  double event_step = 0.5;         ///< of the smallest threshold: what event pixels may change by between two pictures
   /// How far something may move in an event camera's picture until it is drawn in full again
   /// (sim/sensor/light_between.h); 0: each picture is.
   double event_reach_px = 1.0;

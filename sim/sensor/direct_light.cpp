@@ -3,11 +3,16 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <cmath>
+#include <vector>
 
 #include "core/error.h"
 #include "render/direct/wide_lamps.h"
+#include "render/imager/mean_electrons.h"
 #include "render/scene/film_screen.h"
 #include "sim/scene/device_gel.h"
+#include "sim/scene/device_imager.h"
+#include "sim/scene/light_limits.h"
 
 namespace touchstone::sim {
 namespace {
@@ -75,9 +80,31 @@ double lit_radius(const GelSpec& gel, const Eigen::AlignedBox3d& reach) {
   return far.maxCoeff();
 }
 
-std::string with_figures(const std::string& verdict, const render::DirectError& error) {
-  return fmt::format("{}: {:.2f} +- {:.2f} % off path tracing (root mean square over {} pixels of the deepest press)",
-                     verdict, 100 * error.rms, 100 * error.rms_error, error.pixels);
+std::string with_figures(const std::string& verdict, const render::DirectChoice& chosen) {
+  std::string text =
+      fmt::format("{}: {:.2f} +- {:.2f} % ", verdict, 100 * chosen.error.rms, 100 * chosen.error.rms_error);
+  if (chosen.seen_error) {
+    text += fmt::format("and {:.2f} +- {:.2f} of the imager's noise ", chosen.seen_error->rms,
+                        chosen.seen_error->rms_error);
+  }
+  return text +
+         fmt::format("off path tracing (root mean square over {} pixels of the deepest press)", chosen.error.pixels);
+}
+
+/// Light as electrons in units of their noise: the root's slope is one over it.
+cv::Mat in_units_of_noise(const cv::Mat& light, const std::vector<render::ImagerResponse>& channels) {
+  cv::Mat seen = render::mean_electrons(light, channels);
+  const int count = static_cast<int>(channels.size());
+  for (int row = 0; row < seen.rows; ++row) {
+    auto* values = seen.ptr<float>(row);
+    for (int i = 0; i < seen.cols * count; ++i) {
+      const render::ImagerResponse& one = channels[static_cast<std::size_t>(i % count)];
+      const double level = std::min<double>(values[i], one.full_well_e);
+      const double dark = render::noise_e(one, 0.0);
+      values[i] = static_cast<float>(2.0 * std::sqrt(std::max(0.0, level) + dark * dark));
+    }
+  }
+  return seen;
 }
 
 }  // namespace
@@ -95,7 +122,14 @@ struct AskedLight {
     const Truth& judged = deepest(truths);
     pressed = for_direct_light(view.seen(judged.press, relief != nullptr ? *relief : view.relief(judged.press)));
     reach = reach_of(rest, pressed, truths, -view.scene.device.gel.thickness_mm);
-    settings.tolerance = view.scene.light.direct_tolerance;
+    const LightLimits limits = light_limits(view.scene);
+    settings.tolerance = limits.direct_tolerance;
+    if (limits.direct_noise) {
+      const auto channels = render::channel_responses(imager(view.scene.device, view.plan.bands, true));
+      settings.field_accuracy = render::light_field_settings(rest, reach, settings).accuracy;
+      settings.tolerance = *limits.direct_noise;
+      settings.error.seen = [channels](const cv::Mat& light) { return in_units_of_noise(light, channels); };
+    }
     settings.direct.seed = settings.error.seed = settings.rest.seed = view.scene.seed;
     settings.error.samples = kPathsToMeasure;
     settings.lit_radius = lit_radius(view.scene.device.gel, reach);
@@ -132,22 +166,22 @@ DirectLight::DirectLight(const SceneView& view, const render::Camera& camera, st
   render::DirectChoiceSettings& settings = asked.settings;
   settings.direct.edge_side = wanted.edge_side;
   settings.guides = wanted.guides;
-  settings.field_accuracy = wanted.field_accuracy;
+  if (wanted.field_accuracy > 0.0) settings.field_accuracy = wanted.field_accuracy;
   settings.samples.assign(wanted.rays.begin(), wanted.rays.end());
   settings.whatever = forced;
   render::DirectChoice chosen = render::choose_direct(asked.rest, asked.pressed, camera, asked.reach, settings);
   if (chosen.error.pixels > 0) choice_.error = chosen.error;
   if (!chosen.renderer) {
     if (forced) fail_at(scene.where, "effects.direct_light: on, but {}", chosen.reason);
-    choice_.reason = choice_.error ? fmt::format("{}; allowed are {:.3g} %", with_figures("paths", chosen.error),
-                                                 100 * scene.light.direct_tolerance)
+    choice_.reason = choice_.error ? fmt::format("{}; allowed are {}", with_figures("paths", chosen),
+                                                 direct_limit_in_words(light_limits(scene)))
                                    : fmt::format("paths: {}", chosen.reason);
     return;
   }
   choice_.direct = true;
   const int rays = settings.direct.samples = chosen.samples;
   choice_.reason =
-      with_figures(rays == 1 ? "direct light" : fmt::format("direct light of {} rays a pixel", rays), chosen.error);
+      with_figures(rays == 1 ? "direct light" : fmt::format("direct light of {} rays a pixel", rays), chosen);
   settings_ = settings.direct;
   rest_ = asked.rest;
   rest_.interreflection = false;

@@ -8,31 +8,16 @@
 #include <utility>
 
 #include "core/error.h"
-#include "render/imager/imager.h"
 #include "sim/plan/image_motion.h"
 #include "sim/scene/device_camera.h"
-#include "sim/scene/device_imager.h"
+#include "sim/scene/light_limits.h"
+#include "sim/sensor/photocurrent.h"
 #include "sim/view/scene_view.h"
 
 namespace touchstone::sim {
 namespace {
 
 constexpr double kSameLight = 0.05;  // of the smallest threshold
-
-/// The device's imager as a counter of electrons a second.
-render::Imager electron_counter(const DeviceSpec& device, const SceneBands& bands) {
-  render::Imager imager = sim::imager(device, bands, false);
-  imager.exposure_s = 1.0;
-  return imager;
-}
-
-/// One channel's photocurrent of one pixel's light.
-double photocurrent(const render::QuantumEfficiency& per_irradiance, int channel, const float* light) {
-  double current = 0.0;
-  for (Eigen::Index band = 0; band < per_irradiance.cols(); ++band)
-    current += per_irradiance(channel, band) * light[band];
-  return current;
-}
 
 }  // namespace
 
@@ -43,14 +28,13 @@ struct LightSequence::Parts {
         view(scene, plan, gel),
         camera(camera_of(*scene.device.camera)),
         size(render::size_of(camera).x(), render::size_of(camera).y()),
-        imager(electron_counter(scene.device, plan.bands)),
-        per_irradiance(render::response_of(imager).electrons_per_irradiance),
+        currents(scene.device, plan.bands),
         pixels(scene.device.camera->events.value().pixels),
         tolerance(kSameLight * smallest_threshold),
         scale(scene.device),
         object_radius_mm(largest_object_radius(scene)) {
     settings.seed = scene.seed;
-    settings.min_samples = settings.max_samples = scene.light.max_samples;
+    settings.min_samples = settings.max_samples = scene.light.max_samples.value_or(kUsualMaxSamples);
     const double nearest = std::max(1e-3, -scene.device.gel.thickness_mm - scene.device.camera->position_mm.z());
     blur_px = blur_radius_px(camera, nearest);
   }
@@ -59,8 +43,7 @@ struct LightSequence::Parts {
   SceneView view;
   render::Camera camera;
   cv::Size size;
-  render::Imager imager;
-  render::QuantumEfficiency per_irradiance;  // electrons a second per W/m^2
+  Photocurrents currents;
   render::EventPixelSettings pixels;
   double tolerance;  // of logarithms
   ImageScale scale;
@@ -71,14 +54,14 @@ struct LightSequence::Parts {
   /// Logarithms of all channels' photocurrents in a preview.
   cv::Mat log_preview(const render::Tracer& tracer) const {
     const cv::Mat light = tracer.preview(camera, 1);
-    const auto channels = static_cast<int>(per_irradiance.rows());
+    const int channels = currents.channels();
     cv::Mat logs(light.size(), CV_32FC(channels));
     for (int row = 0; row < light.rows; ++row) {
       const auto* in = light.ptr<float>(row);
       auto* out = logs.ptr<float>(row);
       for (int column = 0; column < light.cols; ++column, in += light.channels()) {
         for (int channel = 0; channel < channels; ++channel) {
-          *out++ = static_cast<float>(std::log(photocurrent(per_irradiance, channel, in) + pixels.dark_intensity));
+          *out++ = static_cast<float>(std::log(currents.of(channel, in) + pixels.dark_intensity));
         }
       }
     }
@@ -131,24 +114,6 @@ struct LightSequence::Parts {
     return picture;
   }
 
-  /// All pixels' photocurrents.
-  void put_current(const cv::Mat& irradiance, cv::Mat& current) const {
-    const int bands = irradiance.channels();
-    tbb::parallel_for(0, size.height, [&](int row) {
-      const auto* light = irradiance.ptr<float>(row);
-      auto* out = current.ptr<float>(row);
-      if (bands == 1 && per_irradiance.rows() == 1) {
-        const auto factor = static_cast<float>(per_irradiance(0, 0));
-        for (int column = 0; column < size.width; ++column) out[column] = factor * light[column];
-        return;
-      }
-      for (int column = 0; column < size.width; ++column) {
-        const int channel = render::channel_of(imager.bayer, column, row);
-        out[column] = static_cast<float>(photocurrent(per_irradiance, channel, light + column * bands));
-      }
-    });
-  }
-
   void put_light(const cv::Mat& irradiance, const cv::Mat& mask, SequencePicture& picture) const {
     const int bands = irradiance.channels();
     for (int row = 0; row < size.height; ++row) {
@@ -157,8 +122,7 @@ struct LightSequence::Parts {
       auto* current = picture.photocurrent.ptr<float>(row);
       for (int column = 0; column < size.width; ++column) {
         if (set[column] == 0) continue;
-        const int channel = render::channel_of(imager.bayer, column, row);
-        current[column] = static_cast<float>(photocurrent(per_irradiance, channel, light + column * bands));
+        current[column] = static_cast<float>(currents.at(column, row, light + column * bands));
       }
     }
     picture.log_photocurrent = render::log_intensity(picture.photocurrent, pixels);
@@ -192,7 +156,7 @@ const DirectLight* LightSequence::direct() const {
 
 void LightSequence::pixel_currents(const cv::Mat& irradiance, cv::Mat& currents) const {
   currents.create(parts_->size, CV_32FC1);
-  parts_->put_current(irradiance, currents);
+  parts_->currents.put(irradiance, currents);
 }
 
 SequencePicture LightSequence::first(const fem::PressState& press) const {

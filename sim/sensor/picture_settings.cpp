@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "sim/scene/light_limits.h"
+
 namespace touchstone::sim {
 namespace {
 
@@ -25,15 +27,16 @@ render::NoiseTarget noise_target(const render::ImagerResponse& response, double 
 render::RenderSettings picture_settings(const SceneSpec& scene, const render::ImagerResponse& response) {
   render::RenderSettings settings;
   settings.seed = scene.seed;
-  settings.min_samples = scene.light.min_samples;
-  settings.max_samples = scene.light.max_samples;
-  settings.noise = noise_target(response, scene.light.noise_fraction);
+  const LightLimits limits = light_limits(scene);
+  settings.min_samples = limits.min_samples;
+  settings.max_samples = limits.max_samples;
+  settings.noise = noise_target(response, limits.noise_fraction);
   return settings;
 }
 
 render::RenderSettings key_frame_settings(const SceneSpec& scene, const render::ImagerResponse& response, bool first) {
   render::RenderSettings well = picture_settings(scene, response);
-  well.noise = noise_target(response, kKeyFrameFraction * scene.light.noise_fraction);
+  well.noise = noise_target(response, kKeyFrameFraction * light_limits(scene).noise_fraction);
   if (first) well.max_samples *= kFirstFrameSamples;
   return well;
 }

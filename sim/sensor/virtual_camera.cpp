@@ -18,6 +18,7 @@
 #include "sim/press/exposure_times.h"
 #include "sim/scene/device_camera.h"
 #include "sim/scene/device_imager.h"
+#include "sim/scene/light_limits.h"
 #include "sim/sensor/background_light.h"
 #include "sim/sensor/colour_numbers.h"
 #include "sim/sensor/direct_light.h"
@@ -326,7 +327,8 @@ struct VirtualCamera::Parts : SceneView {
     const render::ShutterTiming timing = shutter_timing();
     render::RenderSettings of_moment = settings;
     const double intervals_of_row = timing.exposure_s / times.back() * static_cast<double>(times.size() - 1);
-    of_moment.noise = noise_target(response, scene.light.noise_fraction * std::sqrt(std::max(1.0, intervals_of_row)));
+    of_moment.noise =
+        noise_target(response, light_limits(scene).noise_fraction * std::sqrt(std::max(1.0, intervals_of_row)));
     render::RollingExposure sum(times, timing, size, plan.bands.count());
     render::RayCounts counts;
     for (std::size_t i = 0; i < times.size(); ++i) {

@@ -54,6 +54,9 @@ Membrane::Membrane(const SceneSpec& scene, const Plan& plan, const fem::Complian
 Membrane::Membrane(const SceneSpec& scene, const Plan& plan, std::shared_ptr<const fem::SmoothSurface> surface)
     : surface_(std::move(surface)), pixel_(scene.membrane.pixel_um * 1e-3), relief_pixel_(plan.relief_pixel_mm) {
   if (plan.fine_relief) shape_ = contact_shape(scene.object);
+  if (plan.elastic_object && scene.object.elastic) {
+    object_ = fem::ElasticMaterial{scene.object.elastic->youngs_modulus_MPa, scene.object.elastic->poisson_ratio};
+  }
   const Eigen::Vector2d size = scene.membrane.height_size_mm.value_or(2.0 * scene.device.mesh.fine_half_extent_mm);
   columns_ = std::max(1, static_cast<int>(std::lround(size.x() / pixel_)));
   rows_ = std::max(1, static_cast<int>(std::lround(size.y() / pixel_)));
@@ -67,6 +70,7 @@ std::optional<fem::ReliefAnswer> Membrane::relief(const fem::PressState& press) 
   if (!shape_) return std::nullopt;
   fem::ReliefSettings settings;
   settings.pitch = relief_pixel_;
+  settings.object = object_;
   return fem::solve_fine_relief(*surface_, press, *shape_, settings);
 }
 

@@ -43,7 +43,8 @@ class Membrane {
 
  private:
   std::shared_ptr<const fem::SmoothSurface> surface_;
-  std::optional<fem::ContactShape> shape_;  // with all its detail; only where fine relief is on
+  std::optional<fem::ContactShape> shape_;      // with all its detail; only where fine relief is on
+  std::optional<fem::ElasticMaterial> object_;  // of an elastic one
   double pixel_, relief_pixel_;
   int columns_, rows_;
 };

@@ -15,6 +15,7 @@
 #include "core/error.h"
 #include "fem/finite_strain/finite_press.h"
 #include "fem/mesh/slab.h"
+#include "tests/fem/mesh/box_mesh.h"
 
 namespace touchstone::fem {
 namespace {
@@ -297,6 +298,77 @@ TEST(FineRelief, WavesAreFilledOrBridgedAsJohnsonSays) {
   const double bridged = imprint(wavy_stamp(period, 4.0 * critical), period, depth);
   EXPECT_LT(bridged, 2.5 * critical);
   EXPECT_GT(bridged, 0.5 * critical);
+}
+
+/// An elastic body whose face is the plane z = 0, towards -z, or the lower cap of a ball about (0, 0, 0).
+std::shared_ptr<const Compliance> elastic_body(const ElasticMaterial& material, double radius) {
+  TetMesh mesh = fixtures::box_mesh({4.2, 4.2, 3}, 11, 11, 7);
+  for (Eigen::Vector3d& vertex : mesh.vertices) {
+    vertex = {vertex.x(), -vertex.y(), -vertex.z()};
+    if (radius > 0.0) {
+      const double low = -std::sqrt(radius * radius - vertex.head<2>().squaredNorm());
+      vertex.z() = low - vertex.z() / 3.0 * low;  // held in the plane z = 0
+    }
+  }
+  return std::make_shared<Compliance>(compute_compliance(mesh, material, {}, 3.0));
+}
+
+/// As soft as the gel, the stamp takes half of each wave: of what is filled the gel shows its own compliance's share.
+TEST(FineRelief, AnElasticObjectTakesItsShareOfAWave) {
+  const double depth = 0.25;
+  const double period = 0.4;
+  const ElasticMaterial soft{0.33, 0.45};
+  const double share = (1.0 - 0.49 * 0.49) / (2.0 - 0.49 * 0.49 - 0.45 * 0.45);
+  const RoundedCylinder plain{2.0, 0.2, 3.0};
+  const PressBody body{plain, 0.0, elastic_body(soft, 0.0)};
+  Press press(coarse_gel(), std::vector{body});
+  PressTarget target;
+  target.axis = {AxisControl::at(0.0), AxisControl::at(0.0), AxisControl::at(-depth)};
+  const PressState& state = press.step(target);
+  ReliefSettings settings;
+  settings.pitch = 0.01;
+  settings.object = soft;
+  // Trough to crest, of the wave of the stamp's period alone.
+  const auto waves = [&](double amplitude) {
+    const ReliefAnswer answer = solve_fine_relief(coarse_surface(), state, wavy_stamp(period, amplitude), settings);
+    EXPECT_TRUE(answer.solved.converged);
+    const HeightField height(coarse_surface(), state, &answer);
+    constexpr int kPlaces = 200;
+    double sum = 0.0;
+    for (int i = 0; i < kPlaces; ++i) {
+      const double x = period * i / kPlaces;
+      sum += std::cos(2.0 * std::numbers::pi * x / period) * height.at({x, 0.0});
+    }
+    return 4.0 * sum / kPlaces;
+  };
+  const double of_amplitude = (waves(0.01) - waves(0.0)) / 0.01;
+  EXPECT_NEAR(std::abs(of_amplitude), share, 0.02 * share);
+  settings.object = ElasticMaterial{3e4, 0.45};  // no share
+  EXPECT_NEAR(std::abs(waves(0.01) - waves(0.0)) / 0.01, 1.0, 0.02);
+}
+
+/// What an elastic ball does, the coarse press knows already.
+TEST(FineRelief, AnElasticBallStandsWhereTheCoarsePressHasIt) {
+  const double depth = 0.4;
+  const ElasticMaterial soft{0.5, 0.45};
+  const SphereShape ball{3.0};
+  Press press(coarse_gel(), std::vector{PressBody{ball, 0.0, elastic_body(soft, 3.0)}});
+  PressTarget target;
+  target.axis = {AxisControl::at(0.1), AxisControl::at(-0.2), AxisControl::at(3.0 - depth)};
+  const PressState& state = press.step(target);
+  ASSERT_EQ(state.object_gives.size(), static_cast<Eigen::Index>(coarse_gel().vertices.size()));
+  ReliefSettings settings;
+  settings.object = soft;
+  const ReliefAnswer answer = solve_fine_relief(coarse_surface(), state, ball, settings);
+  EXPECT_TRUE(answer.solved.converged);
+  EXPECT_LT(std::abs(answer.solved.shift), 0.03 * depth);
+  const HeightField fine(coarse_surface(), state, &answer);
+  const HeightField coarse(coarse_surface(), state, nullptr);
+  const Eigen::Vector2d middle(0.1, -0.2);
+  EXPECT_NEAR(fine.at(middle), coarse.at(middle), 0.03 * depth);
+  // Taken for a rigid one, it would sink as deep as it stands.
+  const ReliefAnswer rigid = solve_fine_relief(coarse_surface(), state, ball);
+  EXPECT_GT(std::abs(rigid.solved.shift), 3.0 * std::abs(answer.solved.shift) + 0.1 * depth);
 }
 
 TEST(FineRelief, RefusesWhatItCantDo) {

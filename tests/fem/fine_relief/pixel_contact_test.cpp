@@ -120,6 +120,23 @@ TEST(PixelContact, ASphereOnAThickLayerIsHertz) {
   EXPECT_LT(forced.force_residual, 1e-12);
 }
 
+/// As soft as the layer or four times as stiff: Hertz with the two's common modulus.
+TEST(PixelContact, AnElasticSphereOnAThickLayerIsHertz) {
+  const double radius = 10.0;
+  const double approach = 0.02;
+  const PixelGrid grid = centred(160, 160, 0.008);
+  for (const double softer : {1.0, 0.25}) {
+    const LayerResponse both(kGel, 1e4, grid, GridEdges::free, softer / kPlaneModulus);
+    const auto gap =
+        gap_of(grid, [&](const Eigen::Vector2d& x) { return x.squaredNorm() / (2.0 * radius) - approach; });
+    const auto answer = solve_pixel_contact(both, {gap, {}}, {1e-8, 1000});
+    const double force = 4.0 / 3.0 * kPlaneModulus / (1.0 + softer) * std::sqrt(radius) * std::pow(approach, 1.5);
+    EXPECT_NEAR(answer.force, force, 2e-3 * force) << softer;
+    EXPECT_NEAR(answer.pixels_in_contact * grid.pixel_area(), kPi * radius * approach, 0.01 * kPi * radius * approach);
+  }
+  EXPECT_THROW(LayerResponse(kGel, 1.0, grid, GridEdges::free, -1.0), Error);
+}
+
 // A groove of width w between flats needs, at its middle, about the pressure that pushes the gel in by its depth.
 TEST(PixelContact, ANarrowGrooveIsBridgedAndAWideOneFilled) {
   const PixelGrid grid = centred(256, 64, 0.01);

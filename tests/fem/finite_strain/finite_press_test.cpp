@@ -146,7 +146,7 @@ TEST(FinitePress, TheGapsDerivativesAreWhatTheySay) {
     if (pressure[v] > 0.0)
       bent += pressure[v] * (up.weighted[v] + down.weighted[v] - 2 * here.weighted[v]) / (kStep * kStep);
   }
-  const double found = flat.dot(here.curvature * flat);
+  const double found = flat.dot(here.curvature.front() * flat);
   EXPECT_NEAR(found, bent, 1e-3 * std::abs(bent));
 }
 

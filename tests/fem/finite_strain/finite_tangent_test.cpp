@@ -23,16 +23,18 @@ struct Touch {
 
   Touch()
       : gel(fixtures::box_mesh({8, 8, 3}, 8, 8, 4), std::vector<ElasticMaterial>{{0.33, 0.49}}, {}, 3.0),
-        at(untouched(gel, {})),
+        at(untouched(gel, {{}})),
         axes(gel.rest.vertices.size(), Eigen::Matrix3d::Identity()) {
     const double depth = 0.2;
-    at.pose.translation.z() = kRadius - depth;
+    RigidTransform& pose = at.bodies.front().pose;
+    pose.translation.z() = kRadius - depth;
     const SphereShape ball{kRadius};
-    const GapLines lines = gap_lines(gel.space, gel.outer, at.elastic.displacement, ball, at.pose, depth);
-    at.gap = deformed_gap(gel.space, gel.outer, gel.rest.weight, lines, at.elastic.displacement, ball, at.pose, depth,
+    const GapLines lines = gap_lines(gel.space, gel.outer, at.elastic.displacement, ball, pose, depth);
+    at.gap = deformed_gap(gel.space, gel.outer, gel.rest.weight, lines, at.elastic.displacement, ball, pose, depth,
                           at.pressure);
     for (int v = 0; v < static_cast<int>(axes.size()); ++v) {
-      if (std::isfinite(at.gap.weighted[v]) && gel.rest.vertices[v].head<2>().norm() < 2.5) vertices.push_back(v);
+      if (std::isfinite(at.gap.weighted[v])) at.owner[v] = 0;
+      if (at.owner[v] == 0 && gel.rest.vertices[v].head<2>().norm() < 2.5) vertices.push_back(v);
     }
   }
 };
@@ -45,15 +47,16 @@ const Touch& touch() {
 TEST(FiniteTangent, HasTheSameComplianceWithVerticesAddedToIt) {
   const Touch& t = touch();
   for (const int components : {1, 3}) {
-    for (const std::vector<int>& forced : {std::vector<int>{}, std::vector<int>{2}}) {
-      const FiniteTangent all = finite_tangent(t.gel, t.at, t.axes, t.vertices, components, forced);
+    for (const std::vector<LedAxis>& led :
+         {std::vector<LedAxis>{}, std::vector<LedAxis>{{0, 2, 1.0}}, std::vector<LedAxis>{{0, 0, 5.0}, {0, 4, 5.0}}}) {
+      const FiniteTangent all = finite_tangent(t.gel, t.at, t.axes, t.vertices, components, led);
       std::vector<int> some, others;
       for (std::size_t k = 0; k < t.vertices.size(); ++k) (k % 3 == 1 ? others : some).push_back(t.vertices[k]);
       ASSERT_FALSE(others.empty());
-      const FiniteTangent first = finite_tangent(t.gel, t.at, t.axes, some, components, forced);
-      const FiniteTangent wider = with_vertices(first, t.gel, t.at.gap, t.axes, others);
+      const FiniteTangent first = finite_tangent(t.gel, t.at, t.axes, some, components, led);
+      const FiniteTangent wider = with_vertices(first, t.gel, t.at, t.axes, others);
       EXPECT_EQ(wider.block, all.block);
-      EXPECT_EQ(wider.forced, forced);
+      EXPECT_EQ(wider.led, led);
       EXPECT_LT((wider.compliance - all.compliance).cwiseAbs().maxCoeff(), 1e-4 * all.compliance.cwiseAbs().maxCoeff());
       EXPECT_EQ(wider.compliance, Eigen::MatrixXd(wider.compliance.transpose()));
     }
@@ -63,9 +66,9 @@ TEST(FiniteTangent, HasTheSameComplianceWithVerticesAddedToIt) {
 TEST(FiniteTangent, LeavesOutWhatHasNoGapAnyMore) {
   const Touch& t = touch();
   const FiniteTangent all = finite_tangent(t.gel, t.at, t.axes, t.vertices, 1, {});
-  DeformedGap gap = t.at.gap;
-  gap.weighted[t.vertices[2]] = std::numeric_limits<double>::infinity();
-  const FiniteTangent wider = with_vertices(all, t.gel, gap, t.axes, {t.vertices[0]});
+  FiniteSnapshot at = t.at;
+  at.gap.weighted[t.vertices[2]] = std::numeric_limits<double>::infinity();
+  const FiniteTangent wider = with_vertices(all, t.gel, at, t.axes, {t.vertices[0]});
   EXPECT_EQ(wider.block.size() + 1, t.vertices.size());
   EXPECT_EQ(wider.compliance(2, 3), all.compliance(3, 4));
 }

@@ -94,7 +94,7 @@ TEST(EstimatorBench, HeightsOfACoatedGelHaveTheirColumns) {
   EXPECT_THAT(csv, HasSubstr("estimator_error,estimator_least,estimator_most,estimator_unit"));
   EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')), 1 + 1 + bench.rows.size() + 4);
   EXPECT_THAT(more_errors(row(bench, "paths to 16 of the imager's noise"), bench.reference), Each(Gt(0.0)));
-  for (const char* file : {"bench-estimator.svg", "bench-estimator-frames.svg"}) {
+  for (const char* file : {"small-coated-estimator.svg", "small-coated-estimator-frames.svg"}) {
     EXPECT_TRUE(std::any_of(result.files.begin(), result.files.end(), [&](const auto& f) { return f.name == file; }));
   }
 }
@@ -111,7 +111,7 @@ TEST(EstimatorBench, ForcesTrainedWithoutFrictionErrMore) {
   EXPECT_THAT(more_errors(bench.rows.front(), bench.reference), Each(Gt(0.0)));
   EXPECT_THAT(bench.test, HasSubstr("everything on"));
   std::vector<StudyFile> files;
-  EXPECT_THAT(estimator_page(bench, files), HasSubstr("Without friction: forces err by "));
+  EXPECT_THAT(estimator_page(bench, "none", files), HasSubstr("Without friction: forces err by "));
   EXPECT_THAT(files.front().text, HasSubstr(">without friction</text>")) << "beside its point";
 }
 

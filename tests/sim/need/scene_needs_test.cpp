@@ -45,6 +45,32 @@ TEST(SceneNeeds, WhatReflectsNothingCallsForNoInterreflection) {
   EXPECT_GT(*change_of(needs_of(small_scene()), "interreflection")->pixel_noise, 1.0);
 }
 
+// Events are changes of log light: light that is added dims the contrast of a dent.
+TEST(SceneNeeds, EventsAreJudgedByTheContrastThatMakesThem) {
+  SceneSpec scene = small_scene();
+  scene.outputs = {.frames = false, .events = true};
+  scene.device.camera->events.emplace().pixels.dark_intensity = 1e4;
+  const Change bright = *change_of(needs_of(scene), "interreflection");
+  EXPECT_FALSE(bright.pixel_noise) << "no picture is asked for";
+  EXPECT_GT(bright.event_percent.value(), 1.0);
+  scene.device.gel.frame_albedo = 0.0;
+  scene.object.albedo = 0.0;
+  EXPECT_LT(change_of(needs_of(scene), "interreflection")->event_percent.value(), 0.1 * *bright.event_percent);
+  EXPECT_TRUE(exceeds({.event_percent = 5.1}, Accuracy{}));
+}
+
+// A second object counts as the first one does, also where that one touches nothing.
+TEST(SceneNeeds, OfSeveralObjectsCountTheOneThatIsPressed) {
+  SceneSpec scene = small_scene();
+  scene.outputs = {.frames = false};
+  const double alone = change_of(needs_of(scene, {}), "finite strain")->force_percent.value();
+  scene.more_objects.push_back({scene.object, scene.motion, {}});
+  scene.motion.start_mm.z() += 3.0;
+  for (MotionKey& key : scene.motion.keys) key = {.frames = key.frames};
+  const double second = change_of(needs_of(scene, {}), "finite strain")->force_percent.value();
+  EXPECT_NEAR(second, alone, 0.1 * alone);
+}
+
 // What the coating and the housing throw back lights the whole pad, pressed or not; a background recorded of the unit
 // has it already, so only what a dent changes of it is left to leave out.
 TEST(SceneNeeds, ABackgroundGivesBackWhatIsMissingAtRest) {
@@ -98,8 +124,9 @@ TEST(SceneNeeds, DeeperPressesCallForFiniteStrain) {
 TEST(SceneNeeds, AreTheSameEachTimeAndKept) {
   SceneSpec scene = small_scene();
   scene.outputs = {.frames = false};
-  scene.more_objects.push_back({scene.object, scene.motion, {}});  // then finite strain isn't tried
-  scene.more_objects.back().motion.start_mm.x() = 5.0;
+  scene.motion.keys.resize(1);
+  scene.motion.keys.front() = {.frames = 1, .z = AxisKey{.position_mm = 1.6}};
+  scene.device.mesh.fine_mm = 1.2;
   scene.accuracy.emplace();
   const test::TemporaryFolder folder;
   const auto whys = [](const Plan& plan) {
@@ -109,6 +136,7 @@ TEST(SceneNeeds, AreTheSameEachTimeAndKept) {
   };
   const std::string first = whys(plan_by_need(scene, "key", folder.path()));
   EXPECT_THAT(first, HasSubstr("leaving it out changes"));
+  EXPECT_THAT(first, HasSubstr("finite strain: the gel is stretched"));
   EXPECT_EQ(first, whys(plan_by_need(scene, "", cache().path()))) << "measured anew";
   std::filesystem::path kept;
   for (const auto& entry : std::filesystem::directory_iterator(folder.path())) {

@@ -3,10 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
 #include "core/error.h"
 #include "sim/plan/plan.h"
+#include "sim/scene/light_limits.h"
 #include "tests/support/message_of.h"
 #include "tests/support/temporary_folder.h"
 
@@ -23,8 +25,8 @@ SceneSpec shipped(const std::string& name) {
 
 SceneSpec wanted(const std::string& name, Accuracy accuracy = {}) {
   SceneSpec scene = shipped(name);
-  scene.accuracy =
-      AccuracySpec{accuracy.force_percent, accuracy.pixel_noise, accuracy.marker_px, accuracy.height_um, {}};
+  scene.accuracy = AccuracySpec{accuracy.force_percent, accuracy.pixel_noise,   accuracy.marker_px,
+                                accuracy.height_um,     accuracy.event_percent, {}};
   return scene;
 }
 
@@ -103,11 +105,43 @@ TEST(Need, SwitchesCountMoreAndThePlanSaysWhatTheyLeaveOut) {
 TEST(Need, FiniteStrainThatCantBeHadIsLeftOutWithAWarning) {
   SceneSpec scene = wanted("ball-press.yaml");
   scene.more_objects.push_back({scene.object, scene.motion, {}});
-  const Plan plan = make_plan(scene, {{"finite strain", Change{.force_percent = 6.0}, ""}});
+  const SceneNeeds needs = {{"finite strain", Change{.force_percent = 6.0}, ""}};
+  EXPECT_TRUE(make_plan(scene, needs).finite_strain);
+  scene.device.mesh.force_error = 0.01;
+  const Plan plan = make_plan(scene, needs);
   EXPECT_FALSE(plan.finite_strain);
   ASSERT_FALSE(plan.warnings.empty());
   EXPECT_THAT(plan.warnings.front(),
-              AllOf(HasSubstr("finite strain is left out"), HasSubstr("6 %"), HasSubstr("several objects")));
+              AllOf(HasSubstr("finite strain is left out"), HasSubstr("6 %"), HasSubstr("fine_mm")));
+}
+
+TEST(Need, PathsFollowTheAccuracyUnlessTheSceneStatesThem) {
+  const LightLimits usual = light_limits(shipped("ball-press.yaml"));
+  EXPECT_EQ(usual.noise_fraction, 1.0);
+  EXPECT_EQ(usual.min_samples, 32);
+  EXPECT_EQ(usual.max_samples, 64);
+  EXPECT_EQ(usual.direct_tolerance, 0.015);
+  SceneSpec scene = wanted("ball-press.yaml", {.pixel_noise = 0.5});
+  const LightLimits exact = light_limits(scene);
+  EXPECT_DOUBLE_EQ(exact.noise_fraction, 0.5 * std::sqrt(0.5));
+  EXPECT_EQ(exact.max_samples, 4096);
+  EXPECT_LT(exact.direct_tolerance, 0.015);
+  EXPECT_DOUBLE_EQ(exact.direct_noise.value(), exact.noise_fraction);
+  EXPECT_FALSE(usual.direct_noise);
+  EXPECT_DOUBLE_EQ(light_limits(wanted("ball-press.yaml", {.pixel_noise = 1.0})).direct_tolerance,
+                   2.0 * exact.direct_tolerance);
+  EXPECT_THAT(
+      effect(make_plan(scene, {}), "noise of paths").why,
+      AllOf(HasSubstr("32 to 4096 paths"), HasSubstr("0.35 of the imager's noise"), HasSubstr("0.5 of the noise")));
+  scene.light.max_samples = 16;
+  scene.light.noise_fraction = 2.0;
+  scene.light.direct_tolerance = 0.2;
+  const LightLimits stated = light_limits(scene);
+  EXPECT_EQ(stated.max_samples, 16);
+  EXPECT_EQ(stated.min_samples, 16);
+  EXPECT_EQ(stated.noise_fraction, 2.0);
+  EXPECT_EQ(stated.direct_tolerance, 0.2);
+  EXPECT_FALSE(stated.direct_noise) << "what the scene states counts";
 }
 
 TEST(Need, AMeshThatCantMeetTheAccuracyIsNamedWithTheLeastThereIs) {

@@ -45,6 +45,9 @@ TEST(Plan, FiniteStrainIsOnWhereTheSceneAsksForIt) {
   EXPECT_FALSE(plan.relaxation);
   scene.device.gel.relaxation = {{0.2, 1.0}};
   EXPECT_TRUE(make_plan(scene).relaxation);
+  scene.motion.keys.front().turn_x.emplace();
+  EXPECT_THROW(make_plan(scene), Error) << "torques on a gel that relaxes";
+  scene.motion.keys.front().turn_x.reset();
   scene.effects.inertia = Switch::on;
   EXPECT_THROW(make_plan(scene), Error);
 }

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
 
@@ -75,6 +76,49 @@ struct Moments {
     variance = square / sum - mean * mean;
   }
 };
+
+/// A bar that glows and sticks to the gel, shaken with inertia on: its picture follows its pose without a lag, by as
+/// many pixels a mm as when it is led slowly.
+TEST(Vibration, PicturesFollowTheShakenBody) {
+  const auto seen_at = [](const std::string& keys, std::vector<double>& places_mm) {
+    SceneSpec scene = passing_bar();
+    scene.device.beads = parse_yaml<DeviceSpec>(kMovingDevice, "device.yaml").beads;  // the gel's modes have them
+    scene.object = parse_yaml<ObjectSpec>(
+        "name: bar\nshape: {type: box, size_mm: [2, 2, 0.5]}\nradiance: [5, 5, 5]\nfriction: 3\n", "object.yaml");
+    scene.motion = parse_yaml<MotionSpec>("start_mm: [0, 0, 0.26]\nframe_rate_Hz: 900\nkeys:\n" + keys, "motion.yaml");
+    scene.effects.motion_blur = scene.effects.rolling_shutter = Switch::off;
+    scene.light.change_tolerance = 0.0;
+    scene.device.camera->exposure_us = 1000.0;
+    scene.light.min_samples = scene.light.max_samples = 256;
+    if (scene.motion.keys.back().vibration) scene.effects.inertia = Switch::on;
+    const Plan plan = make_plan(scene);
+    const test::TemporaryFolder cache;
+    const auto modes = set_up_vibration(scene, plan, cache.path());
+    EXPECT_EQ(modes != nullptr, plan.inertia);
+    const std::vector<Truth> truths = play_motion(scene, plan, *moving_gel(), {}, modes.get());
+    const VirtualCamera camera(scene, plan, *moving_gel(), truths.front());
+    std::vector<double> columns;
+    for (const Truth& truth : truths) {
+      if (truth.frame < 2) continue;  // it comes down
+      places_mm.push_back(truth.press.gel_from_object.translation.x());
+      columns.push_back(Moments(green_of(camera.capture(truth))).mean);
+    }
+    return columns;
+  };
+  const std::string press = "  - {frames: 2, z: {position_mm: 0.15}}\n";
+  std::vector<double> led_mm;
+  const std::vector<double> led = seen_at(press + "  - {frames: 2, x: {position_mm: 0.04}}\n", led_mm);
+  const double per_mm = (led.back() - led.front()) / (led_mm.back() - led_mm.front());
+  ASSERT_GT(per_mm, 2.0);
+  std::vector<double> shaken_mm;
+  const std::vector<double> shaken =
+      seen_at(press + "  - {frames: 9, vibration: {axis: x, amplitude_mm: 0.04, frequency_Hz: 100}}\n", shaken_mm);
+  const auto [least, most] = std::minmax_element(shaken_mm.begin(), shaken_mm.end());
+  EXPECT_GT(*most - *least, 0.07) << "to and fro in nine frames";
+  for (std::size_t i = 0; i < shaken.size(); ++i) {
+    EXPECT_NEAR(shaken[i] - shaken[0], per_mm * (shaken_mm[i] - shaken_mm[0]), 0.03 * per_mm * 0.08) << i;
+  }
+}
 
 TEST(MotionBlur, IsLeftOutWhereTheHoleBlursMore) {
   SceneSpec scene = passing_bar();

@@ -112,6 +112,34 @@ TEST_F(SeveralObjects, AnyTangentialOneCallsForFriction) {
   EXPECT_LT(std::abs(truths.back().press.wrench[0]), 0.05 * truths.back().press.wrench[2]);
 }
 
+TEST_F(SeveralObjects, ArePressedAtFiniteStrain) {
+  const std::string large = "effects: {elasticity: neo_hookean}\n";
+  const double left = play(scene(-5.0, large)).back().press.wrench[2];
+  const auto both = play(scene(-5.0, one_more(5.0, "slower.yaml") + large));
+  const auto linear = play(scene(-5.0, one_more(5.0, "slower.yaml")));
+  ASSERT_EQ(both.size(), 3u);
+  EXPECT_NEAR(both.back().press.bodies[0].wrench[2], left, 0.02 * left);
+  for (int b = 0; b < 2; ++b) {
+    const double force = both.back().press.bodies[b].wrench[2];
+    EXPECT_GT(force, 0.01);
+    EXPECT_NEAR(force, linear.back().press.bodies[b].wrench[2], 0.2 * force);
+  }
+}
+
+TEST_F(SeveralObjects, AreTurnedByTorquesAtFiniteStrain) {
+  const std::string start = "start_mm: [0, 0, 2.1]\nkeys:\n  - {frames: 2, z: {force_N: 0.2}}\n  - {frames: 2";
+  write("press.yaml", start + ", turn_x: {torque_Nmm: 0}, turn_y: {torque_Nmm: 0}}\n");
+  write("slower.yaml", start + "}\n");
+  const SceneSpec spec =
+      scene(-4.0, one_more(4.0, "slower.yaml") + "effects: {elasticity: neo_hookean, friction: on}\n");
+  const auto truths = play(spec);
+  const fem::PressState& state = truths.back().press;
+  EXPECT_LT(state.torque_residual, 1e-5);
+  EXPECT_NEAR(state.bodies[0].wrench[2], 0.2, 1e-6);
+  EXPECT_NEAR(state.bodies[1].wrench[2], 0.2, 1e-6);
+  EXPECT_EQ(state.bodies[1].gel_from_object.rotation, Eigen::Matrix3d(Eigen::Matrix3d::Identity()));
+}
+
 TEST_F(SeveralObjects, MayBeElasticOrRigid) {
   write("soft.yaml",
         "name: soft\nshape: {type: sphere, radius_mm: 2}\n"

@@ -16,6 +16,7 @@
 #include "sim/press/gel_setup.h"
 #include "sim/press/play_motion.h"
 #include "sim/press/truth.h"
+#include "sim/scene/light_limits.h"
 #include "sim/scene/scene.h"
 #include "sim/sensor/virtual_camera.h"
 #include "tests/support/message_of.h"
@@ -127,12 +128,12 @@ TEST(DirectLight, ACoatedGelsPicturesAreWithinTheTolerance) {
   ASSERT_TRUE(choice.direct) << choice.reason;
   ASSERT_TRUE(choice.error);
   EXPECT_THAT(choice.reason, HasSubstr("direct light"));
-  EXPECT_LE(largest_rms(*choice.error), scene.light.direct_tolerance);
+  EXPECT_LE(largest_rms(*choice.error), LightLimits{}.direct_tolerance);
   const Capture last = seen.last();
   EXPECT_TRUE(last.direct);
   const std::array<cv::Mat, 2> traced = traced_twice(scene, 2);
-  EXPECT_LT(off_paths(last.radiance, traced), scene.light.direct_tolerance);
-  EXPECT_GT(off_paths(seen.camera->capture(seen.truths.front()).radiance, traced), scene.light.direct_tolerance)
+  EXPECT_LT(off_paths(last.radiance, traced), LightLimits{}.direct_tolerance);
+  EXPECT_GT(off_paths(seen.camera->capture(seen.truths.front()).radiance, traced), LightLimits{}.direct_tolerance)
       << "the press is seen";
 }
 
@@ -162,7 +163,7 @@ TEST(DirectLight, ATranslucentCoatShowsWhetherABrightOrADarkBallTouchesIt) {
     EXPECT_NEAR(ratio(of_dark, at_rest, 12, 12, band), 0.4 / free, 0.1) << "the ball's middle lies deeper";
   }
   const std::array<cv::Mat, 2> traced = traced_twice(dark.scene, 2);
-  EXPECT_LT(off_paths(of_dark, traced), dark.scene.light.direct_tolerance);
+  EXPECT_LT(off_paths(of_dark, traced), LightLimits{}.direct_tolerance);
   EXPECT_GT(off_paths(of_bright, traced), off_paths(of_dark, traced));
 }
 
@@ -209,7 +210,7 @@ TEST(DirectLight, LightComesInThroughClearSides) {
   ASSERT_TRUE(clear.camera->light_choice().direct) << clear.camera->light_choice().reason;
   const cv::Mat lit = clear.last().radiance;
   EXPECT_GT(lit.at<cv::Vec3f>(12, 12)[0], 1e-3f);
-  EXPECT_LT(off_paths(lit, traced_twice(scene, 2)), scene.light.direct_tolerance);
+  EXPECT_LT(off_paths(lit, traced_twice(scene, 2)), LightLimits{}.direct_tolerance);
   EXPECT_GT(lit.at<cv::Vec3f>(12, 3)[0], lit.at<cv::Vec3f>(12, 20)[0]) << "red comes from the left";
   scene.device.gel.frame = GelFrame::painted;
   EXPECT_LT(see(scene).last().radiance.at<cv::Vec3f>(12, 12)[0], 1e-6f);
@@ -240,7 +241,7 @@ TEST(DirectLight, AnExposureIsTheMeanOfItsMoments) {
   const Capture blurred = seen.camera->capture(seen.truths[moving]);
   EXPECT_TRUE(blurred.direct);
   EXPECT_GE(blurred.pixels_traced, 2 * 24 * 24) << "several moments";
-  EXPECT_LT(off_paths(blurred.radiance, traced_twice(scene, moving)), scene.light.direct_tolerance);
+  EXPECT_LT(off_paths(blurred.radiance, traced_twice(scene, moving)), LightLimits{}.direct_tolerance);
   scene.effects.motion_blur = Switch::off;
   const Seen sharp = see(scene);
   EXPECT_FALSE(same_bytes(blurred.radiance, sharp.camera->capture(sharp.truths[moving]).radiance));
