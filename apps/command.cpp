@@ -26,12 +26,14 @@ void add_calibrate_command(CLI::App& app, const GlobalOptions& global, Action& a
   add_9dtact_calibration(*command, global, action);
   add_chroma_calibration(*command, global, action);
   add_gelsight_calibration(*command, global, action);
+  add_markers_calibration(*command, global, action);
   add_vhs_calibration(*command, global, action);
 }
 
 void add_estimate_command(CLI::App& app, const GlobalOptions& global, Action& action) {
-  CLI::App* command = app.add_subcommand(
-      "estimate", "What a sensor's frames show, by a model that `calibrate` made; markers by the frames alone");
+  CLI::App* command = app.add_subcommand("estimate",
+                                         "What a sensor's frames show, by a model that `calibrate` made; "
+                                         "displacements, contact and slip of markers by the frames alone");
   command->require_subcommand(1);
   add_9dtact_estimation(*command, global, action);
   add_chroma_estimation(*command, global, action);

@@ -49,6 +49,7 @@ void print_finished(const std::filesystem::path& out, std::int64_t samples);
 // What calibrate and estimate do differs from sensor to sensor: each sensor's form is a command below them.
 void add_9dtact_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
 void add_chroma_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
+void add_markers_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
 void add_vhs_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
 void add_gelsight_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
 void add_9dtact_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);

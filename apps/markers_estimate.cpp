@@ -1,40 +1,71 @@
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
+#include <optional>
 
 #include "apps/command.h"
+#include "apps/marker_options.h"
 #include "apps/progress_bar.h"
+#include "core/error.h"
 #include "lab/gelsight/marker_tracks.h"
+#include "sensors/markers/gel_force_model.h"
 
 namespace touchstone::apps {
 namespace {
 
 struct EstimateOptions {
-  std::filesystem::path source;
-  std::string split = "all";
-  double frame_rate_Hz = 0.0;
   lab::MarkerTrackSettings settings;
+  bool touch = false;
+  std::filesystem::path force;
+  std::string indenter;
   std::filesystem::path out;
 };
 
-std::vector<datasets::FrameSequence> chosen_frames(const EstimateOptions& options) {
-  if (std::filesystem::exists(options.source / "dataset.json")) {
-    std::optional<datasets::Split> split;
-    if (options.split != "all") split = datasets::split_named(options.split);
-    return datasets::frames_of_data_set(options.source, split);
+/// What is read besides displacements; none unless it's asked for.
+std::optional<sensors::TouchCalibration> wanted_touches(const EstimateOptions& options, const MarkerOptions& frames) {
+  if (options.force.empty() && !options.indenter.empty()) {
+    fail("--indenter: it chooses a line of --force FILE, which isn't given");
   }
-  // Without a rate frames are in order, and that is all: a microsecond apart, which nobody is shown.
-  constexpr double kAny_Hz = 1e6;
-  return {datasets::frames_of_folder(options.source, options.frame_rate_Hz > 0.0 ? options.frame_rate_Hz : kAny_Hz)};
+  if (!options.touch && options.force.empty() && frames.heights.empty()) return std::nullopt;
+  sensors::TouchCalibration parts = gel_parts(frames);
+  if (options.force.empty()) return parts;
+  const sensors::GelForceModel model = sensors::load_gel_force_model(options.force);
+  sensors::use_forces(parts, model, options.indenter);
+  return parts;
 }
 
-void estimate(const EstimateOptions& options, const GlobalOptions& global) {
+void print_errors(const std::vector<lab::MarkerTrack>& tracks) {
+  constexpr const char* kAxes = "xyz";
+  bool head = false;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    lab::TouchCount::Errors all;
+    for (const lab::MarkerTrack& track : tracks) {
+      const lab::TouchCount::Errors& one = track.touches.errors[axis];
+      all.frames += one.frames;
+      all.squares_N2 += one.squares_N2;
+      all.largest_N = std::max(all.largest_N, one.largest_N);
+      all.within_two += one.within_two;
+    }
+    if (all.frames == 0) continue;
+    if (!head) fmt::print("\n  axis  frames    RMS N    max N  within two standard errors\n");
+    head = true;
+    const auto count = static_cast<double>(all.frames);
+    fmt::print("  {:<4}  {:>6} {:>8.4f} {:>8.4f}  {:.1f} %\n", kAxes[axis], all.frames,
+               std::sqrt(all.squares_N2 / count), all.largest_N, 100.0 * static_cast<double>(all.within_two) / count);
+  }
+}
+
+void estimate(const EstimateOptions& options, const MarkerOptions& chosen, const GlobalOptions& global) {
   lab::MarkerTrackSettings settings = options.settings;
-  settings.times_known = options.frame_rate_Hz > 0.0 || std::filesystem::exists(options.source / "dataset.json");
+  settings.rest = chosen.rest;
+  settings.times_known = times_known(chosen);
+  settings.touch = wanted_touches(options, chosen);
   std::vector<lab::MarkerTrack> tracks;
   {
     ProgressBar bar(global.quiet);
-    tracks = lab::write_marker_tracks(chosen_frames(options), settings, options.out, bar.listener());
+    tracks = lab::write_marker_tracks(marker_frames(chosen), settings, options.out, bar.listener());
   }
   std::int64_t frames = 0;
   for (const lab::MarkerTrack& track : tracks) {
@@ -46,41 +77,45 @@ void estimate(const EstimateOptions& options, const GlobalOptions& global) {
     }
     frames += track.frames;
   }
-  fmt::print("{}: markers.csv of {} frames\n", options.out.string(), frames);
+  fmt::print("{}: markers.csv{} of {} frames\n", options.out.string(), settings.touch ? " and touch.csv" : "", frames);
   for (const lab::MarkerTrack& track : tracks) {
     if (track.frames == 0) continue;
     fmt::print("  {}: {} {} markers, {:.1f} px wide, {:.1f} px apart; {:.1f} % of their places trusted\n",
                track.sequence, track.markers, sensors::name_of(track.appearance.polarity), track.appearance.diameter_px,
                track.appearance.spacing_px,
                100.0 * static_cast<double>(track.trusted) / static_cast<double>(track.places));
+    if (!settings.touch) continue;
+    fmt::print("    touched in {} frames, slip in {}{}\n", track.touches.touched, track.touches.slips,
+               track.touches.beyond > 0
+                   ? fmt::format("; in {} the force is beyond what the model was fitted to", track.touches.beyond)
+                   : "");
   }
+  print_errors(tracks);
 }
 
 }  // namespace
 
 void add_markers_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action) {
   CLI::App* command = estimations.add_subcommand(
-      "markers", "Displacements of printed markers in any layout, from frames alone: no model is needed");
+      "markers",
+      "Displacements of printed markers in any layout, contact and slip from frames alone; forces by a model");
   auto options = std::make_shared<EstimateOptions>();
-  command
-      ->add_option(
-          "source", options->source,
-          "A folder of frames, taken in natural order of their names, or a data set that `touchstone generate` "
-          "made of scenes")
-      ->required();
-  command->add_option("--rest", options->settings.rest,
-                      "A picture of the untouched gel; without it the first frame shows it");
-  command->add_option("--split", options->split, "Of a data set: train, validate, test or all")->capture_default_str();
-  command->add_option("--frame-rate", options->frame_rate_Hz, "Of a folder of frames, in Hz: for the column of times")
-      ->check(CLI::Range(1e-3, 1e6));
+  const auto frames = add_marker_options(*command, "all");
+  command->add_flag("--touch", options->touch, "Contact, its motion and turn, and slip of each frame, too");
+  command->add_option("--force", options->force,
+                      "The force model that `touchstone calibrate markers` made: forces with their errors, too");
+  command->add_option("--indenter", options->indenter, "Whose line of normal force; needed if the model has several");
   command->add_flag("--overlay", options->settings.overlay, "Pictures of the frames with arrows, too");
   command
       ->add_option("--arrow-scale", options->settings.arrow_scale,
                    "Length of these arrows for a displacement of 1 px, px")
       ->check(CLI::Range(0.1, 1000.0))
       ->capture_default_str();
-  command->add_option("-o,--out", options->out, "The folder of markers.csv and of the folder 'overlay'")->required();
-  command->callback([&action, options, &global] { action = [options, &global] { estimate(*options, global); }; });
+  command->add_option("-o,--out", options->out, "The folder of markers.csv, touch.csv and of the folder 'overlay'")
+      ->required();
+  command->callback([&action, options, frames, &global] {
+    action = [options, frames, &global] { estimate(*options, *frames, global); };
+  });
 }
 
 }  // namespace touchstone::apps

@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "core/error.h"
 #include "lab/gelsight/gelsight_height_experiment.h"
 #include "sensors/heights/height_estimator.h"
 #include "sensors/markers/contact_patch.h"
+#include "sensors/markers/marked_gel.h"
 #include "sensors/markers/marker_filling.h"
 #include "sensors/markers/motion_ratio.h"
 
@@ -66,12 +68,8 @@ cv::Mat without_markers(const cv::Mat& frame, const sensors::TrackedMarkers* mar
 }
 
 sensors::HeightModel for_marked_gel(sensors::HeightModel model, const sim::VirtualSensor& marked, std::uint64_t seed) {
-  std::vector<cv::Mat> rest = backgrounds(marked, seed);
-  for (cv::Mat& frame : rest) {
-    sensors::MarkerTracker tracker(marker_settings(marked));
-    frame = without_markers(frame, &tracker.track({frame, 0}), diameter_px(marked));
-  }
-  model.background = sensors::mean_background(rest);
+  const std::vector<cv::Mat> rest = backgrounds(marked, seed);
+  model = sensors::for_marked_gel(std::move(model), rest, marker_settings(marked));
   model.mm_per_px = marked.mm_per_px();
   return model;
 }
@@ -159,7 +157,7 @@ ShearTest shear_until_slip(const sim::VirtualSensor& sensor, const sim::ObjectSp
     ShearSample sample;
     sample.drag_mm = drag_mm * (static_cast<double>(i) - press.frames) / steps;
     sample.force_N = state.wrench.head<2>().norm();
-    sample.displacement_mm = sensors::mean_displacement(markers, *patch).px.norm() * sensor.mm_per_px();
+    sample.displacement_mm = sensors::patch_motion(markers, *patch).px.norm() * sensor.mm_per_px();
     sample.slides =
         std::find(state.node_state.begin(), state.node_state.end(), fem::NodeState::stick) == state.node_state.end();
     test.samples.push_back(sample);

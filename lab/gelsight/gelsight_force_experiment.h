@@ -19,9 +19,7 @@ sensors::MarkerTrackerSettings marker_settings(const sim::VirtualSensor& sensor)
 /// A frame without its markers, if the device has any: filled where the tracker finds them (`markers`, else nullptr).
 cv::Mat without_markers(const cv::Mat& frame, const sensors::TrackedMarkers* markers, double diameter_px);
 
-/// The same calibration for a gel with markers under the same light: with the background of that gel, its markers
-/// filled. (The thesis doesn't say how it calibrates its second gel. Its table goes from colour to slope, and holds for
-/// both.)
+/// sensors::for_marked_gel with pictures of a marked sensor at rest, and its size of a pixel.
 sensors::HeightModel for_marked_gel(sensors::HeightModel model, const sim::VirtualSensor& marked, std::uint64_t seed);
 
 /// One press of one indenter under its load.

@@ -53,7 +53,7 @@ sensors::TouchCalibration calibrate_for_grasps(const sim::VirtualSensor& flat, c
   calibration.markers = marker_settings(marked);
   calibration.background = marked.background(seed, kFrameOfBackground);
   calibration.normal =
-      press_with_forces(marked, calibration.height, with_friction(ball_of(kForceBall_mm), kCalibrationFriction),
+      press_with_forces(marked, *calibration.height, with_friction(ball_of(kForceBall_mm), kCalibrationFriction),
                         {0.1, 0.2, 0.4, 0.6}, seed)
           .estimated;
   calibration.shear = shear_until_slip(marked, with_friction(flat_cylinder_of(kShearEnd_mm), kCalibrationFriction),

@@ -139,9 +139,9 @@ SlipRun run_slip_case(const sim::VirtualSensor& sensor, const SlipCase& what, co
     truths.resize(std::min(truths.size(), onset + as_count(frames_after * kStatesAFrame) + 1));
   }
 
-  sensors::TouchReader reader({.height = estimators.heights,
+  sensors::TouchReader reader({.background = sensor.background(seed, kBackgroundFrame),
                                .markers = marker_settings(sensor),
-                               .background = sensor.background(seed, kBackgroundFrame),
+                               .height = estimators.heights,
                                .normal = sensors::normal_line(estimators.forces, what.object.name),
                                .shear = sensors::shear_line(estimators.forces)},
                               estimators.settings);

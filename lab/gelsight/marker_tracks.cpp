@@ -28,6 +28,11 @@ std::string line_start(const std::string& sequence, const datasets::LabelledFram
                      times_known ? fmt::format("{}", frame.t_us) : std::string());
 }
 
+/// The line of a frame that can't be used.
+std::string marker_fault_line(const std::string& start, const std::string& fault) {
+  return fmt::format("{},,,,,0,{}\n", start, datasets::csv_cell(fault));
+}
+
 void add_markers(const std::string& start, const sensors::TrackedMarkers& markers, std::string& csv) {
   for (std::size_t i = 0; i < markers.rest.size(); ++i) {
     const Eigen::Vector2d& place = markers.positions[i];
@@ -37,30 +42,60 @@ void add_markers(const std::string& start, const sensors::TrackedMarkers& marker
   }
 }
 
-/// A tracker that has seen the gel at rest. @throws Error naming the picture
-sensors::MarkerTracker tracker_at_rest(const fs::path& rest) {
-  sensors::MarkerTracker tracker({});
-  datasets::on_picture(rest, [&](const cv::Mat& image) {
-    tracker.track({image, std::numeric_limits<std::int64_t>::min()});  // before any frame, whatever clock they have
-  });
-  return tracker;
-}
+/// Follows one sequence's markers, and reads touches if they are wanted.
+class Follower {
+ public:
+  /// Has seen the gel at rest. @throws Error naming the picture
+  Follower(const fs::path& rest, const std::optional<sensors::TouchCalibration>& touch) {
+    datasets::on_picture(rest, [&](const cv::Mat& image) {
+      if (touch) {
+        reader_.emplace(sensors::at_rest(*touch, image));
+      } else {
+        tracker_.emplace(sensors::MarkerTrackerSettings{});
+        tracker_->track({image, std::numeric_limits<std::int64_t>::min()});  // before any frame, whatever their clock
+      }
+    });
+  }
 
-/// @param tracker has seen the gel at rest
-MarkerTrack follow(const datasets::FrameSequence& sequence, sensors::MarkerTracker tracker,
-                   const MarkerTrackSettings& settings, const fs::path& overlays, std::string& csv,
-                   const std::function<void()>& frame_done) {
+  /// None if touches aren't read. @throws Error for a frame that can't be taken
+  const sensors::TouchReading* read(const Frame& frame) {
+    if (reader_) return &reader_->read(frame);
+    tracker_->track(frame);
+    return nullptr;
+  }
+  const sensors::MarkerTracker& tracker() const { return reader_ ? reader_->tracker() : *tracker_; }
+  const sensors::TrackedMarkers& markers() const { return tracker().tracked(); }
+
+ private:
+  std::optional<sensors::MarkerTracker> tracker_;
+  std::optional<sensors::TouchReader> reader_;
+};
+
+/// What is written of all sequences.
+struct Tables {
+  std::string markers = kHeader;
+  std::string touches = touch_header();
+};
+
+/// @param follower has seen the gel at rest
+MarkerTrack follow(const datasets::FrameSequence& sequence, Follower& follower, const MarkerTrackSettings& settings,
+                   const fs::path& overlays, Tables& tables, const std::function<void()>& frame_done) {
   MarkerTrack track;
   track.sequence = sequence.name;
-  track.appearance = tracker.appearance().value();
-  track.appearance.spacing_px = tracker.spacing_px();  // measured between centres, where learning is good to pixels
-  track.markers = static_cast<int>(tracker.tracked().rest.size());
+  track.appearance = follower.tracker().appearance().value();
+  track.appearance.spacing_px = follower.tracker().spacing_px();  // between centres, where learning is good to pixels
+  track.markers = static_cast<int>(follower.markers().rest.size());
   cv::Mat picture;
   for (const datasets::LabelledFrame& frame : sequence.frames) {
     const std::string start = line_start(sequence.name, frame, settings.times_known);
     std::string fault = datasets::fault_on_picture(frame.file, [&](const cv::Mat& image) {
-      const sensors::TrackedMarkers& markers = tracker.track({image, frame.t_us});
-      add_markers(start, markers, csv);
+      const sensors::TouchReading* touch = follower.read({image, frame.t_us});
+      const sensors::TrackedMarkers& markers = follower.markers();
+      add_markers(start, markers, tables.markers);
+      if (touch != nullptr) {
+        tables.touches += touch_line(start, *touch);
+        track.touches.add(*touch, frame.force);
+      }
       ++track.frames;
       track.places += static_cast<std::int64_t>(markers.rest.size());
       for (std::size_t i = 0; i < markers.rest.size(); ++i) track.trusted += markers.trusted(i) ? 1 : 0;
@@ -70,7 +105,8 @@ MarkerTrack follow(const datasets::FrameSequence& sequence, sensors::MarkerTrack
       }
     });
     if (!fault.empty()) {
-      csv += fmt::format("{},,,,,0,{}\n", start, datasets::csv_cell(fault));
+      tables.markers += marker_fault_line(start, fault);
+      tables.touches += touch_fault_line(start, fault);
       track.faults.push_back(std::move(fault));
     } else if (settings.overlay) {
       sim::write_png(overlays / frame.file.filename().replace_extension(".png"), picture);
@@ -91,14 +127,15 @@ std::vector<MarkerTrack> write_marker_tracks(const std::vector<datasets::FrameSe
     ++done;
     if (progress) progress("markers", done, total);
   };
-  // All frames at rest come before anything is written.
-  std::vector<std::optional<sensors::MarkerTracker>> at_rest;
+  const auto rest_of = [&](const datasets::FrameSequence& sequence) {
+    return settings.rest.empty() ? sequence.frames.front().file : settings.rest;
+  };
+  // All frames at rest come before anything is written. What is made of them isn't kept: of many sequences it's large.
   std::vector<std::string> refused;
   for (const datasets::FrameSequence& sequence : sequences) {
-    at_rest.emplace_back();
     refused.emplace_back();
     try {
-      at_rest.back() = tracker_at_rest(settings.rest.empty() ? sequence.frames.front().file : settings.rest);
+      const Follower follower(rest_of(sequence), settings.touch);
     } catch (const Error& error) {
       refused.back() = fmt::format("{} (this is the frame at rest; --rest names another)", error.what());
       if (sequences.size() == 1 || !settings.rest.empty()) fail("{}", refused.back());
@@ -107,16 +144,18 @@ std::vector<MarkerTrack> write_marker_tracks(const std::vector<datasets::FrameSe
   fs::create_directories(folder);
   std::vector<MarkerTrack> tracks;
   std::vector<std::string> faults;
-  std::string csv = kHeader;
+  Tables tables;
   for (std::size_t i = 0; i < sequences.size(); ++i) {
     const datasets::FrameSequence& sequence = sequences[i];
     const fs::path overlays = folder / "overlay" / (sequences.size() > 1 ? sequence.name : "");
-    if (at_rest[i]) {
+    if (refused[i].empty()) {
       if (settings.overlay) fs::create_directories(overlays);
-      tracks.push_back(follow(sequence, std::move(*at_rest[i]), settings, overlays, csv, frame_done));
+      Follower follower(rest_of(sequence), settings.touch);
+      tracks.push_back(follow(sequence, follower, settings, overlays, tables, frame_done));
     } else {
-      csv += fmt::format("{},,,,,0,{}\n", line_start(sequence.name, sequence.frames.front(), settings.times_known),
-                         datasets::csv_cell(refused[i]));
+      const std::string start = line_start(sequence.name, sequence.frames.front(), settings.times_known);
+      tables.markers += marker_fault_line(start, refused[i]);
+      tables.touches += touch_fault_line(start, refused[i]);
       MarkerTrack none;
       none.sequence = sequence.name;
       none.faults.push_back(refused[i]);
@@ -129,7 +168,8 @@ std::vector<MarkerTrack> write_marker_tracks(const std::vector<datasets::FrameSe
   std::size_t without_frames = 0;
   for (const MarkerTrack& track : tracks) without_frames += track.frames == 0 ? 1U : 0U;
   if (without_frames == tracks.size()) fail("none of {} frames can be used; the first: {}", total, faults.front());
-  write_whole_file(folder / "markers.csv", csv);
+  write_whole_file(folder / "markers.csv", tables.markers);
+  if (settings.touch) write_whole_file(folder / "touch.csv", tables.touches);
   return tracks;
 }
 

@@ -90,6 +90,7 @@ std::vector<SlipCase> slip_cases(bool quick) {
 sensors::GelForceModel fit_forces(const sim::VirtualSensor& sensor, const sensors::HeightModel& heights,
                                   const std::vector<SlipCase>& cases, const sensors::LinearForce& shear) {
   sensors::GelForceModel model;
+  model.mm_per_px = sensor.mm_per_px();
   model.gel = sensor.device().name;
   for (const SlipCase& one : cases) {
     const auto known = std::find_if(model.normal.begin(), model.normal.end(),

@@ -2,9 +2,9 @@
 
 #include <limits>
 
-#include "core/error.h"
 #include "python/src/bindings.h"
 #include "python/src/estimator.h"
+#include "python/src/frame_clock.h"
 #include "sensors/markers/marker_tracker.h"
 
 namespace touchstone::python {
@@ -13,37 +13,26 @@ namespace {
 using sensors::MarkerAppearance;
 using sensors::TrackedMarkers;
 
-constexpr std::int64_t kBeforeAll = std::numeric_limits<std::int64_t>::min();
-
 /// A tracker that has seen the gel at rest, and its clock.
 struct Follower {
   explicit Follower(const cv::Mat& rest) { begin(rest); }
 
   void begin(const cv::Mat& rest) {
     sensors::MarkerTracker fresh({});
-    fresh.track({rest, kBeforeAll});
-    tracker = std::move(fresh);  // only if the picture is taken
-    last_us = kBeforeAll;
-    step_us = 1;
+    fresh.track({rest, std::numeric_limits<std::int64_t>::min()});  // before any frame, whatever clock they have
+    tracker = std::move(fresh);                                     // only if the picture is taken
+    clock = {};
   }
 
-  /// @param t_us none: as long after the last frame as that was after the one before
   TrackedMarkers track(const cv::Mat& frame, const std::optional<std::int64_t>& t_us) {
-    if (!t_us && last_us > std::numeric_limits<std::int64_t>::max() - step_us) {
-      fail("t_us: it must be given, the last frame's {} us are too near to the largest number", last_us);
-    }
-    const std::int64_t now = t_us ? *t_us : last_us == kBeforeAll ? 0 : last_us + step_us;
-    const TrackedMarkers& markers = tracker.track({frame, now});
-    // Unsigned: times may lie so far apart that their difference is no number.
-    const auto passed = static_cast<std::uint64_t>(now) - static_cast<std::uint64_t>(last_us);
-    if (last_us != kBeforeAll && passed <= kLongest_us) step_us = static_cast<std::int64_t>(passed);
-    last_us = now;
+    const std::int64_t now_us = clock.time_of_next(t_us);
+    const TrackedMarkers& markers = tracker.track({frame, now_us});
+    clock.note(now_us);
     return markers;
   }
 
-  static constexpr std::uint64_t kLongest_us = std::numeric_limits<std::int64_t>::max();
   sensors::MarkerTracker tracker{{}};
-  std::int64_t last_us = kBeforeAll, step_us = 1;
+  FrameClock clock;
 };
 using Tracker = Guarded<Follower>;
 

@@ -19,6 +19,7 @@ void bind_gelsight(py::module_& module);
 void bind_dtact(py::module_& module);
 void bind_vhs(py::module_& module);
 void bind_markers(py::module_& module);
+void bind_touch(py::module_& module);
 void bind_chroma(py::module_& module);
 
 }  // namespace touchstone::python

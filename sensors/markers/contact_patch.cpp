@@ -94,15 +94,39 @@ std::optional<ContactPatch> contact_patch(const cv::Mat& mask, int least_px) {
   return patch;
 }
 
-MeanDisplacement mean_displacement(const TrackedMarkers& markers, const ContactPatch& patch) {
-  MeanDisplacement mean;
-  for (std::size_t i = 0; i < markers.rest.size(); ++i) {
-    if (!is_found(markers.status[i]) || patch.reach_squared(markers.positions[i]) > 1.0) continue;
-    mean.px += markers.displacement(i);
-    ++mean.markers;
-  }
-  if (mean.markers > 0) mean.px /= mean.markers;
-  return mean;
+PatchMotion patch_motion(const TrackedMarkers& markers, const ContactPatch& patch) {
+  const auto for_held = [&](const auto& use) {
+    for (std::size_t i = 0; i < markers.rest.size(); ++i) {
+      if (is_found(markers.status[i]) && patch.reach_squared(markers.positions[i]) <= 1.0) use(i);
+    }
+  };
+  PatchMotion motion;
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();  // at rest
+  for_held([&](std::size_t i) {
+    motion.px += markers.displacement(i);
+    middle += markers.rest[i];
+    ++motion.markers;
+  });
+  if (motion.markers == 0) return motion;
+  motion.px /= motion.markers;
+  middle /= motion.markers;
+  if (motion.markers < 3) return motion;
+  // The similarity that takes places at rest to those now, by least squares: a turn and a swelling.
+  double along = 0.0, across = 0.0, at_rest = 0.0, now = 0.0;
+  for_held([&](std::size_t i) {
+    const Eigen::Vector2d from = markers.rest[i] - middle;
+    const Eigen::Vector2d to = from + markers.displacement(i) - motion.px;
+    along += from.dot(to);
+    across += from.x() * to.y() - from.y() * to.x();
+    at_rest += from.squaredNorm();
+    now += to.squaredNorm();
+  });
+  const double size = std::hypot(along, across);
+  if (!(at_rest > 0.0) || !(size > 0.0)) return motion;
+  motion.turn = std::atan2(across, along);
+  const double left_over = std::max(now - size * size / at_rest, 0.0);
+  motion.turn_error = std::sqrt(left_over / (2.0 * motion.markers - 4.0) * at_rest) / size;
+  return motion;
 }
 
 }  // namespace touchstone::sensors

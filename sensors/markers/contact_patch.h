@@ -37,13 +37,17 @@ void erase_markers(cv::Mat& mask, const TrackedMarkers& markers, double radius_p
 /// @throws Error unless the mask is CV_8UC1 and not empty
 std::optional<ContactPatch> contact_patch(const cv::Mat& mask, int least_px);
 
-/// How far the markers on the patch have moved since rest.
-struct MeanDisplacement {
-  Eigen::Vector2d px = Eigen::Vector2d::Zero();
-  int markers = 0;  ///< measured ones on the patch, over which the mean goes
+/// How the markers on the patch have moved since rest.
+struct PatchMotion {
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();  ///< mean displacement [Li2015, sec. 4.3]
+  int markers = 0;                               ///< measured ones on the patch, over which the mean goes
+  /// How far they have turned about their middle, from u (right) towards v (down), radians: the turn of what sticks to
+  /// the gel, less what the patch's rim lags behind. None with fewer than three markers.
+  std::optional<double> turn;
+  double turn_error = 0.0;  ///< standard error, from what a turn with a swelling leaves over
 };
 
-/// Mean displacement since rest of the markers on the patch [Li2015, sec. 4.3].
-MeanDisplacement mean_displacement(const TrackedMarkers& markers, const ContactPatch& patch);
+/// The motion since rest of the markers that are measured and lie on the patch now.
+PatchMotion patch_motion(const TrackedMarkers& markers, const ContactPatch& patch);
 
 }  // namespace touchstone::sensors

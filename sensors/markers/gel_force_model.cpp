@@ -15,7 +15,7 @@ namespace touchstone::sensors {
 namespace {
 
 constexpr const char* kFormat = "touchstone.gel_force_model";
-constexpr int kVersion = 1;
+constexpr int kVersion = 2;
 
 std::string fault_of_line(const LinearForce& line) {
   for (const double number : {line.newton_per_unit, line.offset_N, line.r2, line.rms_residual_N,
@@ -77,6 +77,9 @@ const LinearForce& shear_line(const GelForceModel& model) {
 
 std::string fault_of(const GelForceModel& model) {
   if (model.normal.empty() && !model.shear) return "has neither a line for normal force nor one for shear";
+  if (!(model.mm_per_px > 0.0) || !std::isfinite(model.mm_per_px)) {
+    return fmt::format("has {} mm a pixel, above 0 is needed", model.mm_per_px);
+  }
   std::set<std::string> names;
   for (const GelForceModel::Normal& one : model.normal) {
     if (one.indenter.empty()) return "has an indenter without a name";
@@ -99,6 +102,7 @@ std::string to_json(const GelForceModel& model) {
   json["format"] = kFormat;
   json["version"] = kVersion;
   json["gel"] = model.gel;
+  json["mm_per_px"] = model.mm_per_px;
   json["normal_of_height_sum_mm3"] = normal;
   json["shear_of_displacement_mm"] = model.shear ? line_to_json(*model.shear) : Json();
   return json.dump(1) + "\n";
@@ -108,9 +112,10 @@ GelForceModel gel_force_model_from_json(const std::string& text, const std::stri
   const Json json = parse_json(text, name);
   const JsonField root{json, "", name};
   root.expect_format(kFormat, kVersion);
-  root.expect_map({"format", "version", "gel", "normal_of_height_sum_mm3", "shear_of_displacement_mm"});
+  root.expect_map({"format", "version", "gel", "mm_per_px", "normal_of_height_sum_mm3", "shear_of_displacement_mm"});
   GelForceModel model;
   model.gel = root.at("gel").text();
+  model.mm_per_px = root.at("mm_per_px").number();
   const JsonField normal = root.at("normal_of_height_sum_mm3");
   if (!normal.value.is_array()) normal.refuse("is a {}, a list is needed", normal.value.type_name());
   for (std::size_t i = 0; i < normal.value.size(); ++i) {

@@ -18,7 +18,8 @@ struct GelForceModel {
     std::string indenter;  ///< "ball 12.7 mm"; no two alike
     LinearForce line;
   };
-  std::string gel;  ///< the device that it was fitted on; for people
+  std::string gel;         ///< the device that it was fitted on; for people
+  double mm_per_px = 0.0;  ///< of the pictures that it was fitted to, on the gel's face
   std::vector<Normal> normal;
   std::optional<LinearForce> shear;
 };
@@ -29,11 +30,12 @@ const LinearForce& normal_line(const GelForceModel& model, const std::string& in
 /// The line for shear (shear_force_N in linear_force.h). @throws Error if the model has none
 const LinearForce& shear_line(const GelForceModel& model);
 
-/// What makes the model unusable, or "": nothing in it, an indenter without a name or twice, a number that isn't
-/// finite, a slope that isn't positive, r2 above 1, a residual below 0, an empty range, fewer than three samples.
+/// What makes the model unusable, or "": nothing in it, a pixel of no size, an indenter without a name or twice, a
+/// number that isn't finite, a slope that isn't positive, r2 above 1, a residual below 0, an empty range, fewer than
+/// three samples.
 std::string fault_of(const GelForceModel& model);
 
-/// The model as JSON (format "touchstone.gel_force_model", version 1). Numbers are written so that reading gives the
+/// The model as JSON (format "touchstone.gel_force_model", version 2). Numbers are written so that reading gives the
 /// same bits. @throws Error if the model is faulty
 std::string to_json(const GelForceModel& model);
 /// Reads what to_json wrote; `name` stands for the file in messages.

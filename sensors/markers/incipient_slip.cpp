@@ -127,7 +127,7 @@ void IncipientSlipDetector::find_lag(const TrackedMarkers& markers, const Contac
 }
 
 void IncipientSlipDetector::find_slide(const TrackedMarkers& markers, const ContactPatch& patch) {
-  const MeanDisplacement now = mean_displacement(markers, patch);
+  const PatchMotion now = patch_motion(markers, patch);
   result_.shear_px = now.px.norm();
   if (!(result_.shear_px > 0.0) || patch.cover() < kLeastCover) return;
   const Eigen::Vector2d ahead = now.px / result_.shear_px;

@@ -2,10 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "core/error.h"
 
 namespace touchstone::sensors {
+
+namespace {
+
+/// The least mean cosine, weighed by lengths, between displacements and the forces that they are to measure.
+constexpr double kAlongside = 0.5;
+
+}  // namespace
 
 LinearForce fit_linear_force(std::span<const double> measure, std::span<const double> force_N, FitLine line) {
   if (measure.size() != force_N.size()) {
@@ -50,6 +58,39 @@ LinearForce fit_linear_force(std::span<const double> measure, std::span<const do
   fit.lowest_seen = *low;
   fit.highest_seen = *high;
   fit.samples = static_cast<int>(measure.size());
+  return fit;
+}
+
+LinearForce fit_shear_force(std::span<const Eigen::Vector2d> displacement_mm,
+                            std::span<const Eigen::Vector2d> force_N) {
+  std::vector<double> lengths_mm, lengths_N;
+  for (const Eigen::Vector2d& one : displacement_mm) lengths_mm.push_back(one.norm());
+  for (const Eigen::Vector2d& one : force_N) lengths_N.push_back(one.norm());
+  LinearForce fit = fit_linear_force(lengths_mm, lengths_N, FitLine::kThroughOrigin);
+  double along = 0.0, lengths = 0.0, moved = 0.0, about_mean = 0.0, residuals = 0.0;
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (std::size_t i = 0; i < force_N.size(); ++i) {
+    along += force_N[i].dot(displacement_mm[i]);
+    lengths += lengths_N[i] * lengths_mm[i];
+    moved += displacement_mm[i].squaredNorm();
+    mean += force_N[i] / static_cast<double>(force_N.size());
+  }
+  if (!(along >= kAlongside * lengths)) {
+    fail(
+        "shear fit: markers don't go against the forces on the object, whose x must point to the picture's right and y "
+        "down: the mean cosine of displacements and forces on the gel is {:.2f}, at least {} is needed",
+        along / lengths, kAlongside);
+  }
+  fit.newton_per_unit = along / moved;
+  fit.largest_residual_N = 0.0;
+  for (std::size_t i = 0; i < force_N.size(); ++i) {
+    const Eigen::Vector2d residual = force_N[i] - fit.newton_per_unit * displacement_mm[i];
+    residuals += residual.squaredNorm();
+    about_mean += (force_N[i] - mean).squaredNorm();
+    fit.largest_residual_N = std::max(fit.largest_residual_N, residual.cwiseAbs().maxCoeff());
+  }
+  fit.r2 = 1.0 - residuals / about_mean;
+  fit.rms_residual_N = std::sqrt(0.5 * residuals / static_cast<double>(force_N.size()));
   return fit;
 }
 

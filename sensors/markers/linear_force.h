@@ -4,6 +4,8 @@
 // and the shape, that it was fitted to, and within the range that it saw.
 
 #include <Eigen/Core>
+#include <cmath>
+#include <limits>
 #include <opencv2/core/mat.hpp>
 #include <span>
 
@@ -21,6 +23,12 @@ struct LinearForce {
   int samples = 0;
 
   double force_N(double measure) const { return newton_per_unit * measure + offset_N; }
+  /// Standard error of one force that the line gives: what its samples are off from it by, two numbers being fitted.
+  /// How well they stand for what is touched later isn't in it.
+  double standard_error_N() const {
+    return samples > 2 ? rms_residual_N * std::sqrt(samples / (samples - 2.0))
+                       : std::numeric_limits<double>::infinity();
+  }
   bool has_seen(double measure) const { return measure >= lowest_seen && measure <= highest_seen; }
 };
 
@@ -34,8 +42,14 @@ enum class FitLine {
 /// finite, or measures (or forces) that are all equal to 12 digits
 LinearForce fit_linear_force(std::span<const double> measure, std::span<const double> force_N, FitLine line);
 
-/// Shear force (N, along the picture's u and v) of a mean marker displacement (mm) by a gel's line for shear. It has
-/// the displacement's direction: a gel is as stiff along u as along v.
+/// The line through the origin for shear, in both directions at once: forces on the gel (N) along the picture's u and v
+/// against mean marker displacements (mm) along the same. Residuals are those of one component; `lowest_seen` and
+/// `highest_seen` are lengths. @throws Error as fit_linear_force, the lengths being its measures; where displacements
+/// don't go along their forces, as where the two have other axes
+LinearForce fit_shear_force(std::span<const Eigen::Vector2d> displacement_mm, std::span<const Eigen::Vector2d> force_N);
+
+/// Shear force on the gel (N, along the picture's u and v) of a mean marker displacement (mm) by a gel's line for
+/// shear. It has the displacement's direction: a gel is as stiff along u as along v.
 Eigen::Vector2d shear_force_N(const LinearForce& line, const Eigen::Vector2d& displacement_mm);
 
 /// The sum of a height map times a pixel's area: the volume of the dent, so that a fit doesn't depend on the

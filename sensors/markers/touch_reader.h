@@ -18,14 +18,20 @@
 
 namespace touchstone::sensors {
 
-/// What has to be known of one sensor.
+/// What is known of one sensor. Of a gel that nothing more is known of than how it looks at rest, contact, motion and
+/// slip at the rim are read; forces and the thesis's slip rule need lines, heights and normal force a height model.
 struct TouchCalibration {
-  HeightModel height;  ///< its background without markers (marker_filling.h)
-  MarkerTrackerSettings markers;
-  cv::Mat background;  ///< one frame of the untouched gel, with its markers
-  LinearForce normal;  ///< of the height map's sum, mm^3, for the shape of what is touched
-  LinearForce shear;   ///< of the mean marker displacement, mm
+  cv::Mat background;  ///< one frame of the untouched gel, with its markers; grey or BGR, 8 bit
+  MarkerTrackerSettings markers = {};
+  std::optional<HeightModel> height = {};  ///< its background without markers (marked_gel.h)
+  std::optional<LinearForce> normal = {};  ///< of the height map's sum, mm^3, for the shape of what is touched
+  std::optional<LinearForce> shear = {};   ///< of the mean marker displacement, mm
+  double mm_per_px = 0.0;                  ///< of the gel's face; 0: the height model's
 };
+
+/// Those parts for a gel that looks like this at rest, markers and all: the height model is made for_marked_gel.
+/// @throws Error as that and MarkerTracker::track do
+TouchCalibration at_rest(TouchCalibration parts, const cv::Mat& rest);
 
 /// The thresholds of slip, and the least contact.
 struct TouchReaderSettings {
@@ -37,24 +43,33 @@ struct TouchReaderSettings {
 
 /// What one frame says.
 struct TouchReading {
-  cv::Mat height_mm;                  ///< CV_32FC1, markers painted over (height_map.h); valid until the next frame
-  double height_max_mm = 0.0;         ///< of that, indentation positive
-  std::optional<ContactPatch> patch;  ///< none: nothing touches
-  double normal_N = 0.0;              ///< its line's answer, which is the offset where nothing touches
-  Eigen::Vector2d shear_N = Eigen::Vector2d::Zero();  ///< along u and v; zero without a patch
-  std::optional<double> force_ratio, motion_ratio;    ///< slip_rule.h, motion_ratio.h
-  bool rule_slip = false;                             ///< both of them above their thresholds
-  IncipientSlip rim;                                  ///< slip that begins at the contact's rim
+  cv::Mat
+      height_mm;  ///< CV_32FC1, markers painted over (height_map.h); valid until the next frame; empty without model
+  double height_max_mm = 0.0;            ///< of that, indentation positive
+  std::optional<double> height_sum_mm3;  ///< of that; none without height model
+  std::optional<ContactPatch> patch;     ///< none: nothing touches
+  PatchMotion moved;                     ///< of the markers on the patch since rest
+  std::optional<double> normal_N;        ///< its line's answer, 0 where nothing touches; none without line
+  /// The object's on the gel, along u and v, zero where nothing touches; none without line. That on the object is the
+  /// opposite one.
+  std::optional<Eigen::Vector2d> shear_N;
+  double normal_error_N = 0.0, shear_error_N = 0.0;  ///< standard errors (of each component), of the lines' samples
+  bool beyond_calibration = false;  ///< a measure is larger than any that a line was fitted to: that force is a guess
+  std::optional<double> force_ratio, motion_ratio;  ///< slip_rule.h, motion_ratio.h
+  bool rule_slip = false;                           ///< both of them above their thresholds
+  IncipientSlip rim;                                ///< slip that begins at the contact's rim
   int markers_found = 0;
   /// Of the frame. Where it isn't normal nothing is measured: heights and forces mean nothing, markers are held.
   FrameLight light = FrameLight::kNormal;
+  bool trusted = false;  ///< it has light, markers have their own names, and heights aren't of an overexposed frame
 };
 
 /// Reads the frames of one sensor, in their order. One object is for one thread.
 class TouchReader {
  public:
-  /// @throws Error for a background of another size than the height model's, or without markers that could be
-  /// followed; for settings out of their range
+  /// @throws Error for a background of another size or kind than the height model's, or without markers that could be
+  /// followed; for a line whose measure can't be had (normal force without heights, shear without mm_per_px); for
+  /// settings out of their range
   explicit TouchReader(const TouchCalibration& calibration, const TouchReaderSettings& settings = {});
 
   /// @throws Error for a frame of another size or kind than the background, or that isn't later than the one before;
@@ -68,10 +83,16 @@ class TouchReader {
   /// Of the last frame, or of the background; valid until the next one.
   const TrackedMarkers& markers() const { return tracker_.tracked(); }
 
+  /// It follows them: what markers look like, and how far apart they are.
+  const MarkerTracker& tracker() const { return tracker_; }
+
  private:
+  void read_heights(const Frame& frame, const TrackedMarkers& markers, double diameter_px);
+  void read_forces();
+
   TouchCalibration calibration_;
   TouchReaderSettings settings_;
-  HeightEstimator heights_;
+  std::optional<HeightEstimator> heights_;
   MarkerTracker tracker_;
   IncipientSlipDetector rim_;
   cv::Mat before_, bare_, contact_;

@@ -75,6 +75,7 @@ GelForceModel gel_force() {
                          .samples = 3};
   GelForceModel model;
   model.gel = "gel";
+  model.mm_per_px = 0.0625;
   model.normal = {{"ball", line}};
   model.shear = line;
   return model;

@@ -18,10 +18,10 @@
 #include "sensors/reflex/explore_tracker.h"
 #include "sensors/reflex/reflex_loop.h"
 #include "tests/hard_cases/hard_case.h"
-#include "tests/hard_cases/small_height_model.h"
 #include "tests/sensors/beads/rendered_beads.h"
 #include "tests/sensors/colour/painted_colour_markers.h"
 #include "tests/sensors/heights/painted_gel.h"
+#include "tests/sensors/markers/painted_marked_gel.h"
 #include "tests/sensors/markers/painted_markers.h"
 #include "tests/sensors/reflex/painted_fingertip.h"
 #include "tests/support/message_of.h"
@@ -119,7 +119,7 @@ TEST(HardCase30, TheTouchReaderSaysSoAndTakesNoSlipFromIt) {
   MarkedGel gel;
   TouchReader reader(gel.calibration());
   std::int64_t t_us = 0;
-  const double force_N = reader.read({gel.pressed(), ++t_us}).normal_N;
+  const double force_N = reader.read({gel.pressed(), ++t_us}).normal_N.value();
   for (const auto& [name, value, light] : kBadLights) {
     const TouchReading& reading = reader.read({even({kGelWidth, kGelHeight}, CV_8UC3, value), ++t_us});
     EXPECT_EQ(reading.light, light) << name;
@@ -131,7 +131,7 @@ TEST(HardCase30, TheTouchReaderSaysSoAndTakesNoSlipFromIt) {
   const TouchReading& after = reader.read({gel.pressed(), ++t_us});
   Worst away{0.01};
   EXPECT_EQ(after.light, FrameLight::kNormal);
-  EXPECT_LT(away(std::abs(after.normal_N / force_N - 1.0)), away.bar);
+  EXPECT_LT(away(std::abs(*after.normal_N / force_N - 1.0)), away.bar);
   ASSERT_TRUE(after.motion_ratio);
   EXPECT_LT(*after.motion_ratio, 0.1);  // nothing moved since the last frame with light
   EXPECT_FALSE(after.rule_slip || after.rim.slips());

@@ -18,8 +18,8 @@
 #include "sensors/reflex/explore_tracker.h"
 #include "sensors/reflex/reflex_loop.h"
 #include "tests/hard_cases/hard_case.h"
-#include "tests/hard_cases/small_height_model.h"
 #include "tests/sensors/beads/rendered_beads.h"
+#include "tests/sensors/markers/painted_marked_gel.h"
 #include "tests/sensors/markers/painted_markers.h"
 #include "tests/sensors/reflex/painted_fingertip.h"
 #include "tests/support/message_of.h"
@@ -100,7 +100,7 @@ TEST(HardCase44, TheTouchReaderRefusesAndKeepsItsReading) {
   TouchReader other(calibration);
   const TouchReading& reading = reader.read({pressed, 1000});
   other.read({pressed, 1000});
-  const double force_N = reading.normal_N;
+  const double force_N = reading.normal_N.value();
   const cv::Mat height = reading.height_mm.clone();
   ASSERT_GT(force_N, 0.0);
   std::string said;

@@ -259,6 +259,14 @@ def dots_picture():
     return beads_picture([(60 + 25 * i, 40 + 25 * j) for j in range(6) for i in range(8)], radius=5.0)
 
 
+def touched_dots(shift):
+    """The dots moved, and a brighter disc in their middle."""
+    rows, columns = np.mgrid[:240, :320]
+    disc = 1 + 0.4 * (np.hypot(columns - 150, rows - 105) < 60)
+    places = [(60 + shift[0] + 25 * i, 40 + shift[1] + 25 * j) for j in range(6) for i in range(8)]
+    return np.minimum(beads_picture(places, radius=5.0) * disc, 255).astype(np.uint8)
+
+
 def markers_picture(shift=(0.0, 0.0), side=16.0, spacing=40.0, grid=4):
     """As test_estimators.py has it."""
     size = int(spacing * (grid + 1.5))
@@ -369,6 +377,17 @@ class Things:
     def make_stiffness_file(self):
         self.stiffness.save("stiffness.model")
         return "stiffness.model"
+
+    def make_readings(self):
+        reader = ts.TouchReader(dots_picture(), mm_per_px=0.05)
+        return [reader.read(touched_dots(shift)) for shift in ((1, 0), (0, 1), (2, 2), (-2, 1))]
+
+    def make_gel_force(self):
+        return ts.fit_touch_forces(self.readings, [(-1, 0, 1), (0, -1, 1), (-2, -2, 1), (2, -1, 1)])[0]
+
+    def make_gel_force_file(self):
+        self.gel_force.save("gel.model")
+        return "gel.model"
 
     def make_reader(self):
         return ts.ColourMarkerReader(markers_picture(), grid=(4, 4))
@@ -564,6 +583,22 @@ def table(t):
             "frame": (dots_picture(), pictures), "t_us": (1000, numbers)})],
         "MarkerTracker.restart": lambda: [Call(lambda: ts.MarkerTracker(dots_picture()).restart, {
             "rest": (dots_picture(), pictures)})],
+        "TouchReader": lambda: [Call(lambda: ts.TouchReader, {
+            "rest": (rest, pictures), "heights": (heights, only(*STRANGE)), "force": (force, only(*STRANGE)),
+            "indenter": (None, texts), "mm_per_px": (mm_per_px, numbers)},
+            after=lambda reader, rest=rest: reader.read(rest) and None)
+            for rest, heights, force, mm_per_px in ((dots_picture(), None, t.gel_force, 0.05),
+                                                    (dots_picture(), None, None, None))],
+        "TouchReader.read": lambda: [Call(lambda: ts.TouchReader(dots_picture(), force=t.gel_force).read, {
+            "frame": (touched_dots((1, 1)), pictures), "t_us": (1000, numbers)})],
+        "TouchReader.restart": lambda: [Call(lambda: ts.TouchReader(dots_picture()).restart, {
+            "rest": (dots_picture(), pictures)})],
+        "GelForceModel.load": lambda: [Call(lambda: ts.GelForceModel.load, {"path": (t.gel_force_file, paths)})],
+        "GelForceModel.save": lambda: [Call(lambda: t.gel_force.save, {"path": ("y", paths)})],
+        "fit_touch_forces": lambda: [Call(lambda: ts.fit_touch_forces, {
+            "readings": (t.readings, lists_of(lambda valid: STRANGE)),
+            "forces_N": ([(-1, 0, 1), (0, -1, 1), (-2, -2, 1), (2, -1, 1)], arrays), "indenter": ("ball", texts),
+            "series": ([0, 0, 1, 1], lists_of(numbers)), "gel": ("gel", texts)})],
         "StiffnessForceModel.load": lambda: [Call(lambda: ts.StiffnessForceModel.load,
                                                   {"path": (t.stiffness_file, paths)})],
         "StiffnessForceModel.save": lambda: [Call(lambda: t.stiffness.save, {"path": ("y", paths)})],

@@ -143,6 +143,67 @@ def test_pictures_without_markers_are_refused_and_change_nothing():
     assert tracker.track(good).trusted.all()
 
 
+def touched_picture(places, centre=(160, 120), radius=70.0):
+    """Dots, and a disc that is brighter than the gel at rest."""
+    rows, columns = np.mgrid[:240, :320] + 0.5
+    disc = np.clip(radius + 0.5 - np.hypot(columns - centre[0], rows - centre[1]), 0, 1)
+    return np.minimum(dots_picture(places) * (1 + 0.3 * disc), 255).astype(np.uint8)
+
+
+def turned(places, degrees, shift=(0.0, 0.0)):
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return (places - (160, 120)) @ np.array([[c, s], [-s, c]]) + (160, 120) + shift
+
+
+def test_a_touch_is_read_from_pictures_alone():
+    reader = ts.TouchReader(dots_picture(NINE_BY_NINE))
+    nothing = reader.read(dots_picture(NINE_BY_NINE))
+    assert not nothing.touched and nothing.slip == "no contact" and nothing.centre_px is None and nothing.trusted
+    assert nothing.height_mm is None and np.isnan(nothing.force_N).all() and np.isnan(nothing.turn_deg)
+    touch = reader.read(touched_picture(turned(NINE_BY_NINE, 4, (3, -2))))
+    assert touch.touched and abs(touch.centre_px - (160, 120)).max() < 4
+    assert touch.turn_deg == pytest.approx(4, abs=0.2) and 0 < touch.turn_error_deg < 0.2
+    markers = touch.markers.positions_px
+    on = np.linalg.norm(markers - touch.centre_px, axis=1) < 60
+    assert abs(touch.moved_px - touch.markers.displacement_px[on].mean(axis=0)).max() < 1
+    assert touch.moved_markers >= on.sum() and touch.light == "normal" and not touch.extrapolated
+    dark = reader.read(np.zeros((240, 320), np.uint8))
+    assert dark.light == "dark" and not dark.trusted
+    reader.restart(dots_picture(NINE_BY_NINE))
+    assert reader.read(dots_picture(NINE_BY_NINE)).t_us == 0
+
+
+def test_shear_forces_are_learnt_from_touches_and_kept(tmp_path):
+    rest = dots_picture(NINE_BY_NINE)
+    reader = ts.TouchReader(rest, mm_per_px=0.05)
+    shifts = [(1, 0), (2, 1), (-1, 2), (0, -2), (3, 3), (-2, -1)]
+    readings = [reader.read(touched_picture(NINE_BY_NINE + shift)) for shift in shifts]
+    forces = np.column_stack([-0.5 * np.array(shifts, float), np.ones(len(shifts))])  # on the object: 10 N a mm
+    model, report = ts.fit_touch_forces(readings, forces, series=[0, 0, 0, 1, 1, 1], gel="my gel")
+    assert model.shear_N_per_mm == pytest.approx(10, rel=0.02) and model.indenters == [] and model.gel == "my gel"
+    assert report["samples"] == 6 and (report["left_out_error_N"][:2] < 0.05).all() and np.isnan(report["rms_error_N"][2])
+    path = str(tmp_path / "force.json")
+    model.save(path)
+    reader = ts.TouchReader(rest, force=ts.GelForceModel.load(path))
+    touch = reader.read(touched_picture(NINE_BY_NINE + (1.5, -1)))
+    assert touch.force_N[:2] == pytest.approx([-0.75, 0.5], abs=0.03) and np.isnan(touch.force_N[2])
+    assert (touch.force_error_N[:2] > 0).all() and not touch.extrapolated
+    assert reader.read(touched_picture(NINE_BY_NINE + (5, 2))).extrapolated
+
+    for bad, why in ((dict(mm_per_px=0.06, force=model), "0.05 mm a pixel"), (dict(indenter="ball"), "^indenter: "),
+                     (dict(force=model, indenter="ball"), "height model"), (dict(mm_per_px=-1), "mm_per_px")):
+        with pytest.raises(ts.Error, match=why):
+            ts.TouchReader(rest, **bad)
+    for bad, why in ((dict(forces_N=forces[:2]), "forces_N: 2 are given, there are 6"),
+                     (dict(series=[1]), "series: 1 are given, there are 6"), (dict(readings=[1] * 6), "number 0 isn't"),
+                     (dict(forces_N=forces[:, [1, 0, 2]] * (-1, 1, 1)), "don't go against the forces"),
+                     (dict(readings=[]), "0 readings")):
+        with pytest.raises(ts.Error, match=why):
+            ts.fit_touch_forces(**{"readings": readings, "forces_N": forces, **bad})
+    with pytest.raises(ts.Error, match="must be given heights or mm_per_px"):
+        ts.fit_touch_forces([ts.TouchReader(rest).read(rest)], forces[:1])
+
+
 def markers_picture(shift=(0.0, 0.0), side=16.0, spacing=40.0, grid=4):
     """Yellow films of 20 px, soft magenta squares seen through them and beside them; rims are antialiased."""
     size = int(spacing * (grid + 1.5))

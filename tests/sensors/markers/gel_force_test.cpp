@@ -82,6 +82,45 @@ TEST(LinearForce, HeightSumIsTheVolumeAtAnyResolution) {
   EXPECT_THROW(height_sum_mm3(cv::Mat(4, 4, CV_32FC1, cv::Scalar(0)), 0.0), Error);
 }
 
+TEST(LinearForce, TheStandardErrorIsThatOfNewSamples) {
+  RandomStream random(3, 0, Purpose::kTest);
+  double squares = 0.0, stated = 0.0;
+  constexpr int kTries = 2000;
+  for (int i = 0; i < kTries; ++i) {
+    std::vector<double> x, y;
+    for (int k = 0; k < 6; ++k) {
+      x.push_back(k);
+      y.push_back(2.0 * k + 0.3 * random.normal());
+    }
+    const LinearForce line = fit_linear_force(x, y, FitLine::kFree);
+    stated += std::pow(line.standard_error_N(), 2) / kTries;
+    squares += 0.3 * 0.3 / kTries;
+  }
+  EXPECT_NEAR(std::sqrt(stated / squares), 1.0, 0.04);  // with 4 degrees of freedom known to 0.8 %
+  EXPECT_TRUE(std::isinf(LinearForce{}.standard_error_N()));
+}
+
+TEST(LinearForce, ShearIsFittedInBothDirectionsAtOnce) {
+  RandomStream random(4, 0, Purpose::kTest);
+  std::vector<Eigen::Vector2d> moved, force;
+  for (int i = 0; i < 500; ++i) {
+    moved.emplace_back(0.2 * random.normal(), 0.1 * random.normal());
+    force.emplace_back(3.0 * moved.back() + 0.05 * Eigen::Vector2d(random.normal(), random.normal()));
+  }
+  const LinearForce line = fit_shear_force(moved, force);
+  EXPECT_NEAR(line.newton_per_unit, 3.0, 0.03);  // 0.05 / 0.22 / sqrt(500) = 0.010
+  EXPECT_EQ(line.offset_N, 0.0);
+  EXPECT_NEAR(line.standard_error_N(), 0.05, 0.004);
+  EXPECT_GT(line.r2, 0.98);
+  for (Eigen::Vector2d& one : force) one.y() = -one.y();  // y up: what goes along x still fits
+  EXPECT_LT(fit_shear_force(moved, force).r2, 0.8);
+  for (Eigen::Vector2d& one : force) one = {one.y(), -one.x()};
+  EXPECT_THROW(fit_shear_force(moved, force), Error);
+  EXPECT_THROW(fit_shear_force(std::span(moved).first(2), std::span(force).first(2)), Error);
+  moved[7].x() = kNaN;
+  EXPECT_THROW(fit_shear_force(moved, force), Error);
+}
+
 TEST(LinearForce, SamplesBeforeSlipEndWhereTheForceStopsRising) {
   const std::vector<double> force{0.0, 0.1, 0.2, 0.3, 0.39, 0.4, 0.4, 0.39};
   EXPECT_EQ(samples_before_slip(force, 0.95), 4u);
@@ -92,6 +131,7 @@ TEST(LinearForce, SamplesBeforeSlipEndWhereTheForceStopsRising) {
 GelForceModel model_of_two_balls() {
   GelForceModel model;
   model.gel = "gelsight-markers";
+  model.mm_per_px = 0.053;
   const std::array<double, 3> sum{0.1, 0.21, 0.3}, force{0.05, 0.1, 0.16};
   model.normal = {{"ball 12.7 mm", fit_linear_force(sum, force, FitLine::kFree)},
                   {"ball 4.75 mm", fit_linear_force(force, sum, FitLine::kFree)}};
@@ -142,7 +182,9 @@ TEST(GelForceModel, FaultyFilesAreRefused) {
     EXPECT_THROW(gel_force_model_from_json(text, "x.json"), Error) << from << " -> " << to;
   };
   refuses("touchstone.gel_force_model", "touchstone.stiffness_force_model");
-  refuses("\"version\": 1", "\"version\": 2");
+  refuses("\"version\": 2", "\"version\": 1");
+  refuses("\"mm_per_px\": ", "\"mm_per_px\": -");
+  refuses("\"mm_per_px\": 0.053,", "");
   refuses("\"gel\":", "\"gell\":");
   refuses("\"samples\": 3", "\"samples\": 2");
   refuses("\"samples\": 3", "\"samples\": 3.5");
@@ -174,6 +216,26 @@ TEST(MotionRatio, CountsPixelsAboveTheThresholdOfSummedChannels) {
   EXPECT_EQ(motion_ratio(background, later, earlier).motion_px, ratio.motion_px);
 }
 
+TEST(MotionRatio, AGreyPictureIsOneWithThreeLikeChannels) {
+  cv::Mat rest(40, 50, CV_8UC1), later(40, 50, CV_8UC1);
+  RandomStream random(5, 0, Purpose::kTest);
+  for (int i = 0; i < 2000; ++i) {
+    rest.at<std::uint8_t>(i / 50, i % 50) = static_cast<std::uint8_t>(100 + 8 * random.normal());
+    later.at<std::uint8_t>(i / 50, i % 50) = static_cast<std::uint8_t>(100 + 8 * random.normal());
+  }
+  const auto colour = [](const cv::Mat& grey) {
+    cv::Mat three;
+    cv::merge(std::vector<cv::Mat>{grey, grey, grey}, three);
+    return three;
+  };
+  cv::Mat of_grey, of_colour;
+  const MotionRatio grey = motion_ratio(rest, rest, later, {}, &of_grey);
+  const MotionRatio wanted = motion_ratio(colour(rest), colour(rest), colour(later), {}, &of_colour);
+  EXPECT_GT(grey.motion_px, 500);
+  EXPECT_EQ(grey.motion_px, wanted.motion_px);
+  EXPECT_EQ(cv::norm(of_grey, of_colour, cv::NORM_INF), 0.0);
+}
+
 TEST(MotionRatio, MayBeAboveOneAndIsUnknownWithoutContact) {
   const cv::Mat background(50, 50, CV_8UC3, cv::Scalar(100, 100, 100));
   cv::Mat small = background.clone();
@@ -191,6 +253,7 @@ TEST(MotionRatio, PicturesWithoutLightHaveAClearOutcome) {
   EXPECT_THROW(motion_ratio(background, black, cv::Mat()), Error);
   EXPECT_THROW(motion_ratio(background, black, cv::Mat(50, 51, CV_8UC3, cv::Scalar::all(0))), Error);
   EXPECT_THROW(motion_ratio(background, cv::Mat(50, 50, CV_8UC1, cv::Scalar(0)), white), Error);
+  EXPECT_THROW(motion_ratio(cv::Mat(50, 50, CV_16UC1, cv::Scalar(0)), black, white), Error);
   EXPECT_THROW(motion_ratio(background, black, white, {.contact_threshold = kNaN}), Error);
   EXPECT_THROW(motion_ratio(background, black, white, {.motion_threshold = 3.1}), Error);
 }

@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+#include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
@@ -126,10 +128,43 @@ TEST(ContactPatch, MeanDisplacementIsOverItsMarkers) {
   field.step([](const Eigen::Vector2d& place) {
     return (place - kCentre).norm() < kRadius ? Eigen::Vector2d(2, -1) : Eigen::Vector2d(0, 0);
   });
-  const MeanDisplacement mean = mean_displacement(field.markers, round_patch(kCentre, 0.9 * kRadius));
+  const PatchMotion mean = patch_motion(field.markers, round_patch(kCentre, 0.9 * kRadius));
   EXPECT_GT(mean.markers, 10);
   EXPECT_LT((mean.px - Eigen::Vector2d(2, -1)).norm(), 1e-12);
-  EXPECT_EQ(mean_displacement(field.markers, round_patch({-500, 0}, 10)).markers, 0);
+  ASSERT_TRUE(mean.turn);
+  EXPECT_NEAR(*mean.turn, 0.0, 1e-12);
+  const PatchMotion none = patch_motion(field.markers, round_patch({-500, 0}, 10));
+  EXPECT_EQ(none.markers, 0);
+  EXPECT_FALSE(none.turn);
+}
+
+TEST(ContactPatch, ATurnIsReadWhateverElseMoves) {
+  // Turned by 0.3 about a place beside the patch, swollen, moved; then noise, which the stated error must account for.
+  const Eigen::Matrix2d turn = 1.04 * Eigen::Rotation2Dd(0.3).toRotationMatrix();
+  const auto turned = [&](const Eigen::Vector2d& place) {
+    const Eigen::Vector2d from(100, 90);
+    return Eigen::Vector2d(from + turn * (place - from) + Eigen::Vector2d(5, -3) - place);
+  };
+  const ContactPatch patch = round_patch(kCentre, 3.0 * kRadius);
+  Field exact;
+  exact.noise_px = 0.0;
+  exact.step(turned);
+  const PatchMotion seen = patch_motion(exact.markers, patch);
+  ASSERT_TRUE(seen.turn);
+  EXPECT_NEAR(*seen.turn, 0.3, 1e-12);
+  EXPECT_LT(seen.turn_error, 1e-6);
+  double squares = 0.0, stated = 0.0;
+  constexpr int kTries = 400;
+  for (int i = 0; i < kTries; ++i) {
+    Field noisy;
+    noisy.random = RandomStream(static_cast<std::uint64_t>(i), 0, Purpose::kTest);
+    noisy.noise_px = 0.2;
+    noisy.step(turned);
+    const PatchMotion one = patch_motion(noisy.markers, patch);
+    squares += std::pow(*one.turn - 0.3, 2) / kTries;
+    stated += std::pow(one.turn_error, 2) / kTries;
+  }
+  EXPECT_NEAR(std::sqrt(squares / stated), 1.0, 0.1);  // a standard deviation of 400 is known to 3.5 %
 }
 
 TEST(IncipientSlip, StickingMotionHasNoLag) {

@@ -76,7 +76,9 @@ TEST_F(TouchReaderTest, AnUntouchedGelHasNeitherPatchNorForceNorSlip) {
     EXPECT_FALSE(touch.patch);
     EXPECT_FALSE(touch.force_ratio);
     EXPECT_LT(touch.height_max_mm, 0.03);
-    EXPECT_EQ(touch.shear_N, Eigen::Vector2d(0, 0));
+    EXPECT_EQ(touch.shear_N.value(), Eigen::Vector2d(0, 0));
+    EXPECT_EQ(touch.normal_N.value(), 0.0);
+    EXPECT_TRUE(touch.trusted);
     EXPECT_FALSE(touch.rule_slip);
     EXPECT_EQ(touch.rim.state, SlipState::kNoContact);
     EXPECT_EQ(touch.markers_found, static_cast<int>(rest_.size()));
@@ -92,11 +94,49 @@ TEST_F(TouchReaderTest, ABallsDepthForceAndShearAreThoseOfTheFormula) {
   ASSERT_TRUE(touch.patch);
   EXPECT_LT((touch.patch->centre - kCentre_px).norm(), 3.0);
   EXPECT_NEAR(touch.height_max_mm, kBall.at(kBall.centre_mm).height, 0.15 * touch.height_max_mm);
-  EXPECT_NEAR(touch.normal_N, 0.1 * height_sum_mm3(truth, kScale), 0.15 * touch.normal_N);
-  EXPECT_LT((touch.shear_N - 2.0 * kScale * shift).norm(), 0.02 * touch.shear_N.norm());
+  EXPECT_NEAR(*touch.normal_N, 0.1 * height_sum_mm3(truth, kScale), 0.15 * *touch.normal_N);
+  EXPECT_LT((*touch.shear_N - 2.0 * kScale * shift).norm(), 0.02 * touch.shear_N->norm());
   ASSERT_TRUE(touch.force_ratio);
-  EXPECT_NEAR(*touch.force_ratio, touch.shear_N.norm() / touch.normal_N, 1e-12);
+  EXPECT_NEAR(*touch.force_ratio, touch.shear_N->norm() / *touch.normal_N, 1e-12);
   EXPECT_FALSE(touch.rim.slips());  // all moved as one
+}
+
+TEST_F(TouchReaderTest, WithoutAModelContactAndMotionAreRead) {
+  TouchReader reader({.background = calibration_.background});
+  const Eigen::Vector2d shift(2.4, -1.8);
+  const TouchReading& touch = reader.read({frame(ball, moved([&](double) { return shift; })), 1});
+  ASSERT_TRUE(touch.patch);
+  EXPECT_LT((touch.patch->centre - kCentre_px).norm(), 3.0);
+  EXPECT_LT((touch.moved.px - shift).norm(), 0.05);
+  EXPECT_NEAR(touch.moved.turn.value(), 0.0, 0.01);
+  EXPECT_TRUE(touch.trusted);
+  EXPECT_TRUE(touch.height_mm.empty());
+  EXPECT_FALSE(touch.normal_N || touch.shear_N || touch.force_ratio || touch.height_sum_mm3);
+  EXPECT_FALSE(touch.beyond_calibration);
+}
+
+TEST_F(TouchReaderTest, GreyFramesAreReadWithoutHeights) {
+  const auto grey = [&](const cv::Mat& colour) {
+    cv::Mat channel;
+    cv::extractChannel(colour, channel, 1);
+    return channel;
+  };
+  TouchReader reader({.background = grey(calibration_.background), .shear = line(2.0), .mm_per_px = kScale});
+  const Eigen::Vector2d shift(2.4, -1.8);
+  const TouchReading& touch = reader.read({grey(frame(ball, moved([&](double) { return shift; }))), 1});
+  ASSERT_TRUE(touch.patch);
+  EXPECT_LT((*touch.shear_N - 2.0 * kScale * shift).norm(), 0.02 * touch.shear_N->norm());
+  EXPECT_THROW(reader.read({frame(ball, rest_), 2}), Error);
+}
+
+TEST_F(TouchReaderTest, AForceBeyondTheSamplesIsSaidToBe) {
+  calibration_.shear->highest_seen = 3.5 * kScale;
+  calibration_.normal->highest_seen = 1e3;
+  TouchReader reader(calibration_);
+  for (const double far : {3.0, 4.0}) {
+    const auto places = moved([&](double) { return Eigen::Vector2d(far, 0); });
+    EXPECT_EQ(reader.read({frame(ball, places), static_cast<std::int64_t>(far)}).beyond_calibration, far > 3.5);
+  }
 }
 
 TEST_F(TouchReaderTest, ARimThatStaysBehindIsSlipUntilItIsForgotten) {
@@ -125,6 +165,15 @@ TEST_F(TouchReaderTest, WhatCannotBeReadIsRefused) {
   TouchCalibration bad = calibration_;
   bad.background = cv::Mat(kHeight, kWidth, CV_8UC3, cv::Scalar(90, 90, 90));  // no markers
   EXPECT_THROW(TouchReader{bad}, Error);
+  bad = calibration_;
+  bad.height.reset();
+  EXPECT_THROW(TouchReader{bad}, Error);  // normal force without heights
+  bad.normal.reset();
+  EXPECT_THROW(TouchReader{bad}, Error);  // shear without a scale
+  bad.mm_per_px = -1.0;
+  EXPECT_THROW(TouchReader{bad}, Error);
+  bad.mm_per_px = kScale;
+  EXPECT_NO_THROW(TouchReader{bad});
   bad = calibration_;
   bad.background = calibration_.background(cv::Rect(0, 0, 200, 150)).clone();
   EXPECT_THROW(TouchReader{bad}, Error);

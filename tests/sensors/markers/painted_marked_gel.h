@@ -45,8 +45,8 @@ struct MarkedGel {
   TouchCalibration calibration() {
     TouchCalibration made;
     made.height = small_height_model(painter);
-    made.normal.newton_per_unit = 0.1;
-    made.shear.newton_per_unit = 2.0;
+    made.normal = LinearForce{.newton_per_unit = 0.1};
+    made.shear = LinearForce{.newton_per_unit = 2.0};
     made.background = frame([](const Eigen::Vector2d&) { return fixtures::Relief{}; });
     return made;
   }
