@@ -27,6 +27,8 @@ void add_calibrate_command(CLI::App& app, const GlobalOptions& global, Action& a
   add_chroma_calibration(*command, global, action);
   add_gelsight_calibration(*command, global, action);
   add_markers_calibration(*command, global, action);
+  add_place_calibration(*command, global, action);
+  add_texture_calibration(*command, global, action);
   add_vhs_calibration(*command, global, action);
 }
 
@@ -39,6 +41,8 @@ void add_estimate_command(CLI::App& app, const GlobalOptions& global, Action& ac
   add_chroma_estimation(*command, global, action);
   add_gelsight_estimation(*command, global, action);
   add_markers_estimation(*command, global, action);
+  add_place_estimation(*command, global, action);
+  add_texture_estimation(*command, global, action);
   add_vhs_estimation(*command, global, action);
 }
 

@@ -50,11 +50,15 @@ void print_finished(const std::filesystem::path& out, std::int64_t samples);
 void add_9dtact_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
 void add_chroma_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
 void add_markers_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
+void add_place_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
+void add_texture_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
 void add_vhs_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
 void add_gelsight_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
 void add_9dtact_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
 void add_chroma_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
 void add_markers_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
+void add_place_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
+void add_texture_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
 void add_vhs_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
 void add_gelsight_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
 

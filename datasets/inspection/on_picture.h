@@ -9,11 +9,11 @@
 
 namespace touchstone::datasets {
 
-/// Reads a picture and calls `act(image)` on it. @throws Error from either, naming the picture
+/// Calls `act()`. @throws Error from it, naming the file
 template <typename Act>
-void on_picture(const std::filesystem::path& file, const Act& act) {
+void naming(const std::filesystem::path& file, const Act& act) {
   try {
-    act(sim::read_image(file));
+    act();
   } catch (const Error& error) {
     const std::string message = error.what();
     if (message.find(file.string()) != std::string::npos) throw;
@@ -21,15 +21,27 @@ void on_picture(const std::filesystem::path& file, const Act& act) {
   }
 }
 
-/// The same of one frame of many, which isn't to end the work on the others. Gives what is wrong with it, or "".
+/// Reads a picture and calls `act(image)` on it. @throws Error from either, naming the picture
 template <typename Act>
-std::string fault_on_picture(const std::filesystem::path& file, const Act& act) {
+void on_picture(const std::filesystem::path& file, const Act& act) {
+  naming(file, [&] { act(sim::read_image(file)); });
+}
+
+/// Calls `act()`, which isn't to end the work on other files. Gives what is wrong, or "".
+template <typename Act>
+std::string fault_in(const Act& act) {
   try {
-    on_picture(file, act);
+    act();
   } catch (const Error& error) {
     return error.what();
   }
   return "";
+}
+
+/// The same of one frame of many, which isn't to end the work on the others. Gives what is wrong with it, or "".
+template <typename Act>
+std::string fault_on_picture(const std::filesystem::path& file, const Act& act) {
+  return fault_in([&] { on_picture(file, act); });
 }
 
 /// @param faults of the frames that can't be used

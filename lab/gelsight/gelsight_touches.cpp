@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <memory>
-#include <opencv2/imgproc.hpp>
 #include <utility>
 
 #include "core/error.h"
@@ -49,14 +48,6 @@ sensors::PlaceMap fitted_places(const sim::VirtualSensor& sensor) {
   return sensors::fit_place_map(pixels, places, {width, height});
 }
 
-/// Contact where the level of rest isn't known: the higher of two classes of heights [Otsu1979].
-cv::Mat higher_part(const cv::Mat& heights) {
-  cv::Mat grey, mask;
-  cv::normalize(heights, grey, 0.0, 255.0, cv::NORM_MINMAX, CV_8U);
-  cv::threshold(grey, mask, 0.0, 255.0, cv::THRESH_BINARY | cv::THRESH_OTSU);
-  return mask;
-}
-
 }  // namespace
 
 TouchSetup::TouchSetup(const sim::VirtualSensor& sensor, HeightReader heights)
@@ -74,7 +65,7 @@ std::vector<TouchSample> TouchSetup::touches(const sim::TouchObject& object, std
   });
   for (std::size_t i = 0; i < grips.size(); ++i) {
     const cv::Mat heights = heights_(seen[i]);
-    const cv::Mat contact = higher_part(heights);
+    const cv::Mat contact = sensors::higher_part(heights);
     touches[i].image = sensors::rectified(heights, contact, places_);
   }
   return touches;

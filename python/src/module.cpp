@@ -21,5 +21,6 @@ PYBIND11_MODULE(_core, module) {
   python::bind_vhs(module);
   python::bind_markers(module);
   python::bind_touch(module);
+  python::bind_surface(module);
   python::bind_chroma(module);
 }

@@ -1,6 +1,7 @@
 #include "sensors/touch_map/touch_image.h"
 
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
 
@@ -11,6 +12,13 @@ TouchImage touch_by_height(const cv::Mat& height_mm, double mm_per_px, double co
   if (height_mm.type() == CV_32FC1 && !height_mm.empty()) touch.contact = height_mm > contact_above_mm;
   check(touch);
   return touch;
+}
+
+cv::Mat higher_part(const cv::Mat& height_mm) {
+  cv::Mat grey, mask;
+  cv::normalize(height_mm, grey, 0.0, 255.0, cv::NORM_MINMAX, CV_8U);
+  cv::threshold(grey, mask, 0.0, 255.0, cv::THRESH_BINARY | cv::THRESH_OTSU);
+  return mask;
 }
 
 void check(const TouchImage& touch) {

@@ -22,6 +22,10 @@ struct TouchImage {
 /// @throws Error as `check` does
 TouchImage touch_by_height(const cv::Mat& height_mm, double mm_per_px, double contact_above_mm);
 
+/// Contact where the level of rest isn't known, as of heights with a free border: the higher of two classes of heights
+/// [Otsu1979]. CV_8UC1, 255 in contact. @pre CV_32FC1, finite, not empty
+cv::Mat higher_part(const cv::Mat& height_mm);
+
 /// @throws Error for an image that is empty or of another type, a contact mask of another size or type, a height that
 /// isn't finite, or a pitch that isn't above 0
 void check(const TouchImage& touch);

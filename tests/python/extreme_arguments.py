@@ -267,6 +267,10 @@ def touched_dots(shift):
     return np.minimum(beads_picture(places, radius=5.0) * disc, 255).astype(np.uint8)
 
 
+def rough_heights(size=(60, 80)):
+    return np.random.default_rng(2).normal(0, 0.02, size)
+
+
 def markers_picture(shift=(0.0, 0.0), side=16.0, spacing=40.0, grid=4):
     """As test_estimators.py has it."""
     size = int(spacing * (grid + 1.5))
@@ -388,6 +392,24 @@ class Things:
     def make_gel_force_file(self):
         self.gel_force.save("gel.model")
         return "gel.model"
+
+    def textures(self):
+        model = ts.TextureModel(mm_per_px=0.05)
+        model.learn("sand", rough_heights())
+        return model
+
+    def make_texture_file(self):
+        self.textures().save("texture.model")
+        return "texture.model"
+
+    def tactile_map(self):
+        made = ts.TactileMap()
+        made.add(rough_heights(), mm_per_px=0.05)
+        return made
+
+    def make_tactile_file(self):
+        self.tactile_map().save("tactile.map")
+        return "tactile.map"
 
     def make_reader(self):
         return ts.ColourMarkerReader(markers_picture(), grid=(4, 4))
@@ -599,6 +621,20 @@ def table(t):
             "readings": (t.readings, lists_of(lambda valid: STRANGE)),
             "forces_N": ([(-1, 0, 1), (0, -1, 1), (-2, -2, 1), (2, -1, 1)], arrays), "indenter": ("ball", texts),
             "series": ([0, 0, 1, 1], lists_of(numbers)), "gel": ("gel", texts)})],
+        "TextureModel": lambda: [Call(lambda: ts.TextureModel, {
+            "mm_per_px": (0.05, numbers), "grey_step_mm": (0.002, numbers)})],
+        "TextureModel.load": lambda: [Call(lambda: ts.TextureModel.load, {"path": (t.texture_file, paths)})],
+        "TextureModel.save": lambda: [Call(lambda: t.textures().save, {"path": ("y", paths)})],
+        "TextureModel.learn": lambda: [Call(lambda: t.textures().learn, {
+            "material": ("sand", texts), "height_mm": (rough_heights(), arrays)})],
+        "TextureModel.classify": lambda: [Call(lambda: t.textures().classify, {
+            "height_mm": (rough_heights(), arrays), "mm_per_px": (0.05, numbers)})],
+        "TactileMap": lambda: [Call(lambda: ts.TactileMap)],
+        "TactileMap.load": lambda: [Call(lambda: ts.TactileMap.load, {"path": (t.tactile_file, paths)})],
+        "TactileMap.save": lambda: [Call(lambda: t.tactile_map().save, {"path": ("y", paths)})],
+        **{f"TactileMap.{name}": lambda name=name: [Call(lambda: getattr(t.tactile_map(), name), {
+            "height_mm": (rough_heights(), arrays), "mm_per_px": (0.05, numbers),
+            "contact": (rough_heights() > 0, arrays)})] for name in ("add", "localise")},
         "StiffnessForceModel.load": lambda: [Call(lambda: ts.StiffnessForceModel.load,
                                                   {"path": (t.stiffness_file, paths)})],
         "StiffnessForceModel.save": lambda: [Call(lambda: t.stiffness.save, {"path": ("y", paths)})],

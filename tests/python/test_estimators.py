@@ -204,6 +204,72 @@ def test_shear_forces_are_learnt_from_touches_and_kept(tmp_path):
         ts.fit_touch_forces([ts.TouchReader(rest).read(rest)], forces[:1])
 
 
+def woven(period_mm, number, mm_per_px=0.05):
+    rng = np.random.default_rng(number)
+    x, y = turned(mm_per_px * np.mgrid[:100, :120].reshape(2, -1).T, rng.uniform(0, 360)).T.reshape(2, 100, 120)
+    return 0.02 * np.sin(2 * np.pi * x / period_mm) * np.sin(2 * np.pi * y / period_mm) + rng.normal(0, 0.002, x.shape)
+
+
+def test_materials_are_learnt_and_named(tmp_path):
+    model = ts.TextureModel(mm_per_px=0.05, grey_step_mm=0.004)
+    with pytest.raises(ts.Error, match="no sample"):
+        model.classify(woven(0.6, 1))
+    for name, period in (("linen", 0.6), ("denim", 1.1), ("silk", 0.35)):
+        for k in range(5):
+            model.learn(name, woven(period, k))
+    assert model.materials == ["linen", "denim", "silk"] and model.samples == 15
+    path = str(tmp_path / "model.texture")
+    model.save(path)
+    model = ts.TextureModel.load(path)
+    for name, period in (("linen", 0.6), ("denim", 1.1), ("silk", 0.35)):
+        match = model.classify(woven(period, 100), mm_per_px=0.05)
+        assert match.material == name and match.votes >= 2 and match.distance < 0.3
+    assert model.classify(np.zeros((100, 120))).distance > 2 * match.distance
+    for bad, why in ((np.zeros((4, 4)), "at least 33 x 33"), (np.full((100, 100), np.nan), "finite"), (np.zeros(9), "height, width"),
+                     (np.full((100, 100), "1"), "numbers"), (None, "height_mm"), (np.zeros((9000, 100)), "at most 8192")):
+        with pytest.raises(ts.Error, match=why):
+            model.classify(bad)
+    with pytest.raises(ts.Error, match="0.06"):
+        model.classify(woven(0.6, 1), mm_per_px=0.06)
+
+
+def strewn(pose=(0.0, 0.0, 0.0), seed=3):
+    """Studs and rings at random, seen at x, y (mm) and degrees: (240, 320) heights at 0.05 mm a pixel, with noise."""
+    rng = np.random.default_rng(seed)
+    rows, columns = np.mgrid[:240, :320]
+    places = np.stack([(columns - 159.5).ravel(), (rows - 119.5).ravel()], axis=1) * 0.05
+    c, s = np.cos(np.radians(pose[2])), np.sin(np.radians(pose[2]))
+    places = places @ np.array([[c, s], [-s, c]]) + pose[:2]
+    height = np.zeros(len(places))
+    for x, y, ring, width, high in zip(rng.uniform(-12, 12, 250), rng.uniform(-12, 12, 250), rng.uniform(0, 0.9, 250),
+                                       rng.uniform(0.1, 0.2, 250), rng.uniform(0.03, 0.09, 250)):
+        from_ring = abs(np.hypot(places[:, 0] - x, places[:, 1] - y) - (ring if ring > 0.4 else 0)) / width
+        height = np.maximum(height, high * np.exp(-0.5 * from_ring**2))
+    return (0.1 + height + np.random.default_rng(abs(seed + int(100 * sum(pose)))).normal(0, 0.002, len(height))).reshape(240, 320)
+
+
+def test_touches_are_placed_on_a_map(tmp_path):
+    tactile_map = ts.TactileMap()
+    assert tactile_map.touches == 0 and tactile_map.height_mm is None
+    with pytest.raises(ts.Error, match="empty"):
+        tactile_map.save(str(tmp_path / "map"))
+    assert tactile_map.add(strewn(), mm_per_px=0.05, contact=np.ones((240, 320), bool)).localised
+    assert tactile_map.add(strewn((2.0, 1.0, 10.0)), mm_per_px=0.05).localised and tactile_map.touches == 2
+    path = str(tmp_path / "map")
+    tactile_map.save(path)
+    tactile_map = ts.TactileMap.load(path)
+    assert tactile_map.touches == 2 and tactile_map.height_mm.shape[1] > 330 and tactile_map.origin_px.shape == (2,)
+    found = tactile_map.localise(strewn((1.0, -0.5, -25.0)), mm_per_px=0.05)
+    assert found.localised and found.outcome == "localised" and found.correlation > 0.9 and found.overlap > 0.8
+    assert found.place_mm == pytest.approx([1.0, -0.5], abs=0.02) and found.angle_deg == pytest.approx(-25, abs=0.1)
+    stranger = tactile_map.localise(strewn(seed=8), mm_per_px=0.05)
+    assert not stranger.localised and stranger.place_mm is None and stranger.angle_deg is None
+    for bad, why in ((dict(mm_per_px=0.07), "0.07"), (dict(mm_per_px=0), "mm_per_px"),
+                     (dict(contact=np.ones((3, 3))), "contact: is 3 x 3, the heights are 240 x 320")):
+        with pytest.raises(ts.Error, match=why):
+            tactile_map.localise(strewn(), **{"mm_per_px": 0.05, **bad})
+
+
 def markers_picture(shift=(0.0, 0.0), side=16.0, spacing=40.0, grid=4):
     """Yellow films of 20 px, soft magenta squares seen through them and beside them; rims are antialiased."""
     size = int(spacing * (grid + 1.5))

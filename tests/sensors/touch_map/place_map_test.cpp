@@ -86,5 +86,15 @@ TEST(PlaceMap, MarksThatDoNotDetermineItAreRefused) {
                Error);
 }
 
+TEST(TouchImage, TheHigherPartIsContactWhateverTheLevel) {
+  for (const double level : {-0.4, 0.0, 2.0}) {
+    cv::Mat height(60, 80, CV_32FC1, cv::Scalar(level));
+    height(cv::Rect(20, 10, 30, 40)).setTo(level + 0.2);
+    cv::Mat wanted(height.size(), CV_8UC1, cv::Scalar(0));
+    wanted(cv::Rect(20, 10, 30, 40)).setTo(255);
+    EXPECT_EQ(cv::norm(higher_part(height), wanted, cv::NORM_INF), 0.0) << level;
+  }
+}
+
 }  // namespace
 }  // namespace touchstone::sensors

@@ -1,0 +1,95 @@
+#include "lab/gelsight/place_table.h"
+
+#include <utility>
+
+#include "core/error.h"
+#include "core/units.h"
+#include "datasets/inspection/on_picture.h"
+#include "datasets/sets/csv_cells.h"
+
+namespace touchstone::lab {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kMarkColumns = "u_px,v_px,x_mm,y_mm";
+
+}  // namespace
+
+sensors::PlaceMap read_place_map(const fs::path& csv, const cv::Size& size) {
+  std::vector<Eigen::Vector2d> pixels, places;
+  datasets::for_each_row(csv, kMarkColumns, [&](const SourceLocation& where, const std::vector<std::string>& cells) {
+    const auto number = [&](std::size_t i, const char* field) { return datasets::number_in(cells[i], field, where); };
+    pixels.emplace_back(number(0, "u_px") - 0.5, number(1, "v_px") - 0.5);  // continuous indices
+    places.emplace_back(number(2, "x_mm"), number(3, "y_mm"));
+  });
+  sensors::PlaceMap map;
+  datasets::naming(csv, [&] { map = sensors::fit_place_map(pixels, places, size); });
+  return map;
+}
+
+PlaceReader::PlaceReader(HeightSource& source, fs::path marks) : source_(source), marks_(std::move(marks)) {}
+
+sensors::TouchImage PlaceReader::touch_of(const fs::path& file) {
+  const cv::Mat heights = source_.read(file);
+  const cv::Mat contact = sensors::higher_part(heights);
+  if (marks_.empty()) return {heights.clone(), contact, source_.mm_per_px()};
+  if (!places_) places_ = read_place_map(marks_, heights.size());
+  sensors::TouchImage touch;
+  datasets::naming(file, [&] { touch = sensors::rectified(heights, contact, *places_); });
+  return touch;
+}
+
+template <typename Register>
+std::vector<PlaceRecord> PlaceReader::for_touches(const Register& with, const Progress& progress) {
+  // A table of marks that can't be used is no fault of a frame.
+  if (!marks_.empty() && !places_) places_ = read_place_map(marks_, source_.read(source_.files().front()).size());
+  std::vector<PlaceRecord> records;
+  std::vector<std::string> faults;
+  for (const fs::path& file : source_.files()) {
+    PlaceRecord record;
+    record.file = file.filename().string();
+    record.fault = datasets::fault_in([&] {
+      const sensors::TouchImage touch = touch_of(file);
+      datasets::naming(file, [&] { record.found = with(touch); });
+    });
+    if (!record.fault.empty()) faults.push_back(record.fault);
+    records.push_back(std::move(record));
+    if (progress) progress("places", std::ssize(records), std::ssize(source_.files()));
+  }
+  datasets::require_a_frame(faults, records.size());
+  return records;
+}
+
+sensors::TactileMap PlaceReader::build(const sensors::TactileMapSettings& settings, std::vector<PlaceRecord>& records,
+                                       const Progress& progress) {
+  sensors::TactileMap map(settings);
+  records = for_touches([&](const sensors::TouchImage& touch) { return map.add(touch); }, progress);
+  if (map.empty()) fail("none of {} files shows contact", records.size());
+  return map;
+}
+
+std::vector<PlaceRecord> PlaceReader::localise(const sensors::TactileMap& map, const Progress& progress) {
+  return for_touches([&](const sensors::TouchImage& touch) { return map.localise(touch); }, progress);
+}
+
+std::string to_csv(const std::vector<PlaceRecord>& records) {
+  std::string csv = "file,outcome,x_mm,y_mm,angle_deg,confidence,inliers,correlation,overlap,fault\n";
+  for (const PlaceRecord& record : records) {
+    const std::string file = datasets::csv_cell(record.file);
+    const sensors::Registration& found = record.found;
+    if (!record.fault.empty()) {
+      csv += fmt::format("{},,,,,,,,,{}\n", file, datasets::csv_cell(record.fault));
+      continue;
+    }
+    const std::string pose = found.localised() ? fmt::format("{:.4f},{:.4f},{:.3f}", found.to_from_from.translation.x(),
+                                                             found.to_from_from.translation.y(),
+                                                             found.to_from_from.angle / kRadiansPerDegree)
+                                               : ",,";
+    csv += fmt::format("{},{},{},{:.4f},{},{:.4f},{:.4f},\n", file, sensors::name_of(found.outcome), pose,
+                       found.confidence, found.inliers, found.correlation, found.overlap);
+  }
+  return csv;
+}
+
+}  // namespace touchstone::lab
