@@ -25,6 +25,8 @@ void add_calibrate_command(CLI::App& app, const GlobalOptions& global, Action& a
   command->require_subcommand(1);
   add_9dtact_calibration(*command, global, action);
   add_chroma_calibration(*command, global, action);
+  add_event_force_calibration(*command, global, action);
+  add_event_material_calibration(*command, global, action);
   add_gelsight_calibration(*command, global, action);
   add_markers_calibration(*command, global, action);
   add_place_calibration(*command, global, action);
@@ -39,6 +41,8 @@ void add_estimate_command(CLI::App& app, const GlobalOptions& global, Action& ac
   command->require_subcommand(1);
   add_9dtact_estimation(*command, global, action);
   add_chroma_estimation(*command, global, action);
+  add_event_force_estimation(*command, global, action);
+  add_event_material_estimation(*command, global, action);
   add_gelsight_estimation(*command, global, action);
   add_markers_estimation(*command, global, action);
   add_place_estimation(*command, global, action);

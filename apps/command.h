@@ -53,6 +53,8 @@ void add_markers_calibration(CLI::App& calibrations, const GlobalOptions& global
 void add_place_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
 void add_texture_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
 void add_vhs_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
+void add_event_force_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
+void add_event_material_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
 void add_gelsight_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
 void add_9dtact_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
 void add_chroma_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
@@ -60,6 +62,8 @@ void add_markers_estimation(CLI::App& estimations, const GlobalOptions& global, 
 void add_place_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
 void add_texture_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
 void add_vhs_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
+void add_event_force_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
+void add_event_material_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
 void add_gelsight_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
 
 // Below export.

@@ -1,3 +1,4 @@
+#include <cmath>
 #include <memory>
 
 #include "apps/command.h"
@@ -36,6 +37,21 @@ std::string to_csv(const lab::DvsRecording& recording) {
   return csv;
 }
 
+/// The force sensor's readings at the middles of its windows, from the touch on, as `touchstone calibrate event-force`
+/// reads them.
+std::string force_csv(const lab::DvsRecording& recording) {
+  std::string csv = "t_us,force_N\n";
+  const auto line = [&](double seconds, double force_N) {
+    csv += fmt::format("{},{:.6g}\n", std::llround(1e6 * seconds), force_N);
+  };
+  if (recording.readings.empty()) return csv;
+  line(recording.readings.front().seconds - 1e-3 * kWindow_ms, 0.0);  // before it nothing was touched
+  for (const sim::ForceReading& reading : recording.readings) {
+    line(reading.seconds - 0.5e-3 * kWindow_ms, reading.measured_N);
+  }
+  return csv;
+}
+
 std::string table_row(const std::string& name, const lab::DvsRecording& recording) {
   const lab::DvsGraspParameters& p = recording.parameters;
   return fmt::format("{},{},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{}\n", name,
@@ -63,10 +79,12 @@ void record_dvs(const DvsOptions& options, const GlobalOptions& global) {
     }
     grasps = some;
   }
+  for (lab::DvsGraspParameters& grasp : grasps) grasp.motion.rest_s = lab::kDvsWatched_s;
   const sim::MembraneCamera camera(setup.device());
   const cv::Size size(setup.device().camera->width, setup.device().camera->height);
   std::filesystem::create_directories(options.out);
   std::string table = "grasp,material,youngs_modulus_MPa,target_N,light_level,touch_s,release_s,apart_s,events\n";
+  std::string files = "events,forces,material\n";
   auto bar = std::make_unique<ProgressBar>(global.quiet);
   const Progress progress = bar->listener();
   for (std::size_t k = 0; k < grasps.size(); ++k) {
@@ -78,11 +96,15 @@ void record_dvs(const DvsOptions& options, const GlobalOptions& global) {
                                 [&](std::span<const Event> events) { writer.append(events); });
       writer.close();
       write_whole_file(options.out / (name + ".csv"), to_csv(recording));
+      write_whole_file(options.out / (name + "-force.csv"), force_csv(recording));
+      files += fmt::format("{0}.h5,{0}-force.csv,{1}\n", name,
+                           lab::dvs_materials()[static_cast<std::size_t>(recording.parameters.material)].name);
       table += table_row(name, recording);
     });
     if (progress) progress("grasps", static_cast<std::int64_t>(k) + 1, static_cast<std::int64_t>(grasps.size()));
   }
   write_whole_file(options.out / "grasps.csv", table);
+  write_whole_file(options.out / "files.csv", files);
   bar.reset();
   fmt::print("{}: {} grasps\n", options.out.string(), grasps.size());
 }

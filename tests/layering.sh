@@ -66,15 +66,15 @@ lab/vhs: core closed_forms fem/elements fem/contact render/materials render/scen
 lab/gelsight: core closed_forms fem/shapes fem/contact sensors/heights sensors/touch_map sensors/texture sensors/markers sim/files sim/scene sim/sensor sim/grasp datasets/sets datasets/inspection lab/validation
 lab/dtact: core sensors/heights sim/files datasets/sets datasets/inspection lab/gelsight
 lab/chroma: core plots fem/contact fem/finite_strain render/spectra render/scene render/cameras render/paths render/imager sensors/colour sensors/tractions sim/scene sim/plan sim/press sim/view sim/sensor datasets/sets datasets/inspection lab/statistics lab/validation lab/press lab/gelsight
-lab/dvs: core render/membrane render/events sensors/learning sensors/events sim/scene sim/press sim/sensor sim/grasp datasets/sets lab/validation
+lab/dvs: core render/membrane render/events sensors/learning sensors/events sim/scene sim/press sim/sensor sim/grasp datasets/sets datasets/inspection lab/validation
 lab/reflex: core fem/contact fem/finite_strain render/cameras render/paths render/direct render/imager sensors/reflex sim/scene sim/plan sim/press sim/view datasets/sets lab/validation
 lab/studies: core plots fem/mesh fem/elements fem/shapes fem/contact render/sampling render/imager sensors/beads sensors/tractions sim/scene sim/plan sim/press sim/view sim/sensor datasets/jobs lab/validation lab/press lab/vhs lab/chroma
 lab/bench: core plots fem/mesh fem/elements fem/shapes fem/contact fem/error render/cameras render/imager sensors/beads sensors/heights sim/files sim/scene sim/plan sim/press sim/view sim/sensor sim/need sim/cost datasets/sets lab/statistics lab/vhs lab/gelsight lab/studies
 lab/likeness: core render/imager sensors/heights sim/files sim/scene sim/sensor datasets/sets datasets/inspection lab/gelsight
 lab/fit: core render/imager sensors/heights sim/files sim/relief sim/scene sim/press sim/view sim/sensor datasets/jobs datasets/sets datasets/inspection lab/validation lab/gelsight lab/studies lab/likeness
 lab/schema: core sim/scene datasets/jobs lab/vhs lab/studies lab/fit
-apps: core plots render/imager sensors/beads sensors/heights sensors/touch_map sensors/texture sensors/markers sensors/colour sensors/tractions sensors/events sim/files sim/scene sim/plan sim/press sim/view sim/sensor sim/need sim/cost datasets/jobs datasets/sets datasets/exports datasets/inspection lab/validation lab/press lab/device lab/vhs lab/gelsight lab/dtact lab/chroma lab/dvs lab/studies lab/bench lab/likeness lab/fit lab/schema
-python: core sensors/beads sensors/heights sensors/touch_map sensors/texture sensors/markers sensors/colour sim/files sim/scene sim/press sim/sensor datasets/jobs datasets/sets
+apps: core plots render/imager sensors/beads sensors/heights sensors/touch_map sensors/texture sensors/markers sensors/colour sensors/tractions sensors/learning sensors/events sim/files sim/scene sim/plan sim/press sim/view sim/sensor sim/need sim/cost datasets/jobs datasets/sets datasets/exports datasets/inspection lab/validation lab/press lab/device lab/vhs lab/gelsight lab/dtact lab/chroma lab/dvs lab/studies lab/bench lab/likeness lab/fit lab/schema
+python: core sensors/learning sensors/beads sensors/heights sensors/touch_map sensors/texture sensors/markers sensors/colour sensors/events sim/files sim/scene sim/press sim/sensor datasets/jobs datasets/sets
 testing: core sim/files sim/press sim/sensor datasets/jobs lab/device
 END
 )

@@ -14,6 +14,9 @@
 
 namespace touchstone::lab {
 
+/// The camera watches so long before the servo moves: what is at rest is judged by 140 ms of it (grasp_phases.h).
+inline constexpr double kDvsWatched_s = 0.2;
+
 /// What one kind of event pixels recorded of a grasp.
 struct DvsEvents {
   std::vector<sensors::EventCounts> counts;  ///< per millisecond, from the recording's start

@@ -12,7 +12,6 @@ namespace touchstone::lab {
 namespace {
 
 constexpr std::uint64_t kSeed = 4801;  // choices were made on the grasps of 4701
-constexpr double kWatched_s = 0.2;
 constexpr int kQuickGrasps = 4;
 
 std::vector<DvsGraspParameters> grasps_of(const DvsGraspSetup& setup, bool quick, const DvsSpread& spread = {}) {
@@ -20,7 +19,7 @@ std::vector<DvsGraspParameters> grasps_of(const DvsGraspSetup& setup, bool quick
   std::array<int, 4> of_each{};
   for (DvsGraspParameters grasp : setup.draw(kSeed, spread)) {
     if (quick && ++of_each.at(static_cast<std::size_t>(grasp.material)) > kQuickGrasps) continue;
-    grasp.motion.rest_s = kWatched_s;
+    grasp.motion.rest_s = kDvsWatched_s;
     chosen.push_back(grasp);
   }
   return chosen;

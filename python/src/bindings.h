@@ -21,6 +21,7 @@ void bind_vhs(py::module_& module);
 void bind_markers(py::module_& module);
 void bind_touch(py::module_& module);
 void bind_surface(py::module_& module);
+void bind_events(py::module_& module);
 void bind_chroma(py::module_& module);
 
 }  // namespace touchstone::python

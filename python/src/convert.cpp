@@ -176,6 +176,32 @@ py::array pose_array(const RigidTransform& pose) {
   return small_array(rows);
 }
 
+py::object events_array(const std::vector<Event>& events) {
+  const auto count = static_cast<py::ssize_t>(events.size());
+  py::array_t<std::int64_t> t(count);
+  py::array_t<std::uint16_t> x(count), y(count);
+  py::array_t<bool> on(count);
+  for (py::ssize_t k = 0; k < count; ++k) {
+    const Event& event = events[static_cast<std::size_t>(k)];
+    t.mutable_at(k) = event.t_us;
+    x.mutable_at(k) = event.x;
+    y.mutable_at(k) = event.y;
+    on.mutable_at(k) = event.on;
+  }
+  const py::module_ numpy = py::module_::import("numpy");
+  py::list dtype;
+  dtype.append(py::make_tuple("t_us", "i8"));
+  dtype.append(py::make_tuple("x", "u2"));
+  dtype.append(py::make_tuple("y", "u2"));
+  dtype.append(py::make_tuple("on", "?"));
+  py::object records = numpy.attr("empty")(count, numpy.attr("dtype")(dtype));
+  records[py::str("t_us")] = t;
+  records[py::str("x")] = x;
+  records[py::str("y")] = y;
+  records[py::str("on")] = on;
+  return records;
+}
+
 py::array points_array(const std::vector<Eigen::Vector2d>& points) {
   return points_in_rows(points);
 }

@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/frame.h"
 #include "core/progress.h"
 #include "core/transform.h"
 
@@ -80,6 +81,9 @@ py::array pose_array(const RigidTransform& pose);
 /// n x 2 or n x 3.
 py::array points_array(const std::vector<Eigen::Vector2d>& points);
 py::array points_array(const std::vector<Eigen::Vector3d>& points);
+
+/// A copy as records of `t_us`, `x`, `y` and `on`.
+py::object events_array(const std::vector<Event>& events);
 
 /// Numbers in row-major order, `columns` of them a row. @throws Error naming `what` and its shape
 std::vector<double> numbers_from(const py::handle& value, py::ssize_t columns, const char* what);

@@ -22,5 +22,6 @@ PYBIND11_MODULE(_core, module) {
   python::bind_markers(module);
   python::bind_touch(module);
   python::bind_surface(module);
+  python::bind_events(module);
   python::bind_chroma(module);
 }

@@ -33,6 +33,9 @@ from ._core import (
     DarknessEstimator,
     DarknessModel,
     DarknessResult,
+    EventForceModel,
+    EventForceReader,
+    EventMaterialModel,
     ForceEstimate,
     GelForceModel,
     HeightEstimator,
@@ -60,6 +63,7 @@ from ._core import (
     calibrate_height,
     calibrate_hue,
     fit_touch_forces,
+    read_events,
     read_image,
     scenes_folder,
     train_stiffness,
@@ -119,9 +123,10 @@ def merge(job, out, *, progress=None):
 
 __all__ = [
     "BeadTracker", "ColourMarkerReader", "ColourMarkerReading", "DarknessEstimator", "DarknessModel", "DarknessResult",
-    "Dataset", "Error", "ForceEstimate", "GelForceModel", "HeightEstimator", "HeightModel", "HeightResult",
-    "HueEstimator", "HueField", "HueModel", "MarkerTracker", "Object", "Reading", "Registration", "Sensor", "Session",
-    "StiffnessForceModel", "TactileMap", "TextureMatch", "TextureModel", "Touch", "TouchReader", "TouchReading",
-    "TrackedBeads", "TrackedMarkers", "calibrate_darkness", "calibrate_height", "calibrate_hue", "fit_touch_forces",
-    "generate", "merge", "read_image", "scenes_folder", "train_stiffness", "write_png",
+    "Dataset", "Error", "EventForceModel", "EventForceReader", "EventMaterialModel", "ForceEstimate", "GelForceModel",
+    "HeightEstimator", "HeightModel", "HeightResult", "HueEstimator", "HueField", "HueModel", "MarkerTracker", "Object",
+    "Reading", "Registration", "Sensor", "Session", "StiffnessForceModel", "TactileMap", "TextureMatch", "TextureModel",
+    "Touch", "TouchReader", "TouchReading", "TrackedBeads", "TrackedMarkers", "calibrate_darkness", "calibrate_height",
+    "calibrate_hue", "fit_touch_forces", "generate", "merge", "read_events", "read_image", "scenes_folder",
+    "train_stiffness", "write_png",
 ]

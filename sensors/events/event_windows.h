@@ -23,7 +23,7 @@ struct EventWindowSettings {
   std::int64_t start_us = 0;       ///< of the first window
   std::int64_t length_us = 7'000;  ///< of each; the paper's 7 ms
   cv::Size size{240, 180};         ///< of the camera, px (DAVIS 240C)
-  cv::Rect region;                 ///< only its pixels count; empty: all
+  cv::Rect region = {};            ///< only its pixels count; empty: all
 };
 
 /// Counts events that come in portions. Window i is [start + i length, start + (i + 1) length); a window without events

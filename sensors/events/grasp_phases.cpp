@@ -76,15 +76,20 @@ std::int64_t burst_threshold(std::span<const std::int64_t> background, double fa
   return static_cast<std::int64_t>(high);
 }
 
+std::int64_t touch_threshold_of(std::span<const EventCounts> background, const GraspPhaseSettings& settings) {
+  check(settings);
+  if (background.size() < 2) fail("grasp phases: {} windows of background, at least 2 are needed", background.size());
+  return std::max(settings.least_events,
+                  burst_threshold(counts_of(background, &EventCounts::off), settings.false_alarm));
+}
+
 int find_first_touch(std::span<const EventCounts> windows, const GraspPhaseSettings& settings) {
   check(settings);
   const auto background = static_cast<std::size_t>(settings.background_windows);
   if (windows.size() <= background) {
     fail("grasp phases: {} windows; more than the {} of the background are needed", windows.size(), background);
   }
-  const std::int64_t threshold =
-      std::max(settings.least_events,
-               burst_threshold(counts_of(windows.first(background), &EventCounts::off), settings.false_alarm));
+  const std::int64_t threshold = touch_threshold_of(windows.first(background), settings);
   for (std::size_t i = background; i < windows.size(); ++i) {
     if (windows[i].off >= threshold) return static_cast<int>(i);
   }
@@ -95,9 +100,7 @@ GraspPhases find_grasp_phases(std::span<const EventCounts> windows, const GraspP
   GraspPhases phases;
   phases.first_touch = find_first_touch(windows, settings);
   const auto background = static_cast<std::size_t>(settings.background_windows);
-  phases.touch_threshold =
-      std::max(settings.least_events,
-               burst_threshold(counts_of(windows.first(background), &EventCounts::off), settings.false_alarm));
+  phases.touch_threshold = touch_threshold_of(windows.first(background), settings);
   if (phases.first_touch < 0) {
     std::int64_t most = 0;
     for (const EventCounts& window : windows.subspan(background)) most = std::max(most, window.off);

@@ -47,6 +47,10 @@ struct GraspPhases {
 /// 0.5
 std::int64_t burst_threshold(std::span<const std::int64_t> background, double false_alarm);
 
+/// The OFF events that a window needs to be first touch, against these windows of the scene at rest.
+/// @throws Error for fewer than two windows, or a setting out of range
+std::int64_t touch_threshold_of(std::span<const EventCounts> background, const GraspPhaseSettings& settings);
+
 /// The first window after the background whose OFF events are a burst against it, or -1.
 /// @throws Error for fewer windows than the background's, or a setting out of range
 int find_first_touch(std::span<const EventCounts> windows, const GraspPhaseSettings& settings);

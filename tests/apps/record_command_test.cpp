@@ -28,7 +28,10 @@ TEST(RecordCommand, WritesEventsAndForcesOfEachGrasp) {
   EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 3);
   EXPECT_THAT(table, HasSubstr("grasp-00,foam,"));
   EXPECT_THAT(table, HasSubstr("grasp-01,silicone,"));
+  EXPECT_EQ(read_whole_file(out / "files.csv"),
+            "events,forces,material\ngrasp-00.h5,grasp-00-force.csv,foam\ngrasp-01.h5,grasp-01-force.csv,silicone\n");
   for (const char* name : {"grasp-00", "grasp-01"}) {
+    EXPECT_THAT(read_whole_file(out / (std::string(name) + "-force.csv")), StartsWith("t_us,force_N\n"));
     const sensors::EventRecording events = sensors::read_events(out / (std::string(name) + ".h5"));
     EXPECT_EQ(events.source.size, cv::Size(240, 180));
     EXPECT_GT(events.events.size(), 3000u);

@@ -18,6 +18,7 @@
 #include "sensors/beads/stiffness_model_file.h"
 #include "sensors/colour/hue_model_file.h"
 #include "sensors/events/event_file.h"
+#include "sensors/events/grasp_force_model_file.h"
 #include "sensors/events/material_classifier_file.h"
 #include "sensors/events/time_delay_network_file.h"
 #include "sensors/heights/darkness_model_file.h"
@@ -371,6 +372,7 @@ void write_seeds(const std::filesystem::path& corpus) {
   save(hue(HueForm::kPolynomial), models / "hue_polynomial.json");
   save(classifier(), models / "material_classifier.json");
   save(delays(), models / "time_delay_network.json");
+  save(GraspForceModel{delays(), GraspForceError{0.25, 0.125, 0.5}}, models / "grasp_force.json");
   save(stiffness(), models / "stiffness.json");
   save(darkness(), models / "darkness.dark");
   save(height(), models / "height.gel");

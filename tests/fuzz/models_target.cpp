@@ -9,6 +9,7 @@
 #include "core/sha256.h"
 #include "sensors/beads/stiffness_model_file.h"
 #include "sensors/colour/hue_model_file.h"
+#include "sensors/events/grasp_force_model_file.h"
 #include "sensors/events/material_classifier_file.h"
 #include "sensors/events/time_delay_network_file.h"
 #include "sensors/heights/darkness_model_file.h"
@@ -45,10 +46,11 @@ struct Format {
   bool (*comes_back)(const std::string& bytes);
 };
 
-const std::array<Format, 13> kFormats{
+const std::array<Format, 14> kFormats{
     {{"touchstone.explore_model", [](auto& b) { return comes_back(b, explore_model_from_json, to_text); }},
      {"touchstone.gaussian_process", [](auto& b) { return comes_back(b, gaussian_process_from_json, to_text); }},
      {"touchstone.gel_force_model", [](auto& b) { return comes_back(b, gel_force_model_from_json, to_text); }},
+     {"touchstone.grasp_force_model", [](auto& b) { return comes_back(b, grasp_force_model_from_json, to_text); }},
      {"touchstone.hue_model", [](auto& b) { return comes_back(b, hue_model_from_json, to_text); }},
      {"touchstone.material_classifier", [](auto& b) { return comes_back(b, material_classifier_from_json, to_text); }},
      {"touchstone.reflex_model", [](auto& b) { return comes_back(b, reflex_model_from_json, to_text); }},

@@ -7,6 +7,7 @@ may succeed or raise what its entry allows; whether it ends at all is for the pa
 it likes; data sets are made once in SHARED.
 """
 
+import hashlib
 import inspect
 import itertools
 import json
@@ -267,6 +268,38 @@ def touched_dots(shift):
     return np.minimum(beads_picture(places, radius=5.0) * disc, 255).astype(np.uint8)
 
 
+def sealed(name, model):
+    pathlib.Path(name).write_text(json.dumps(with_checksum(model)))
+    return name
+
+
+def with_checksum(model):
+    """Of a model's text without blanks, names in order."""
+    text = json.dumps(model, sort_keys=True, separators=(",", ":"))
+    return {**model, "sha256": hashlib.sha256(text.encode()).hexdigest()}
+
+
+def records(valid):
+    """In place of events."""
+    values = [valid[::-1], valid[:0], valid[:1], valid[None], valid.tolist(), valid["t_us"], 0, NAN, *STRANGE]
+    for field, kinds in (("t_us", ("f8", "u8", "U5", "O", "i4")), ("x", ("i8", "f4", "O")), ("on", ("u1", "f8", "O"))):
+        for kind in kinds:
+            names = [(name, kind if name == field else valid.dtype[name]) for name in valid.dtype.names]
+            values.append(valid.astype(names))
+        values.append(valid[[name for name in valid.dtype.names if name != field]])
+    for t_us in (-2**63, 2**63 - 1, -1, 2**40):
+        changed = valid.copy()
+        changed["t_us"][-1] = t_us
+        values += [changed, changed[-1:]]
+    far = valid.copy()
+    far["x"][3] = 60000
+    return [*values, far]
+
+
+def sizes(valid):
+    return [(0, 1), (-1, 4), (1, 1), (8192, 8192), (8193, 1), (2**40, 2), (1.5, 2), (240,), (1, 2, 3), "ab", 7, NAN, *STRANGE]
+
+
 def rough_heights(size=(60, 80)):
     return np.random.default_rng(2).normal(0, 0.02, size)
 
@@ -410,6 +443,33 @@ class Things:
     def make_tactile_file(self):
         self.tactile_map().save("tactile.map")
         return "tactile.map"
+
+    def make_events(self):
+        events = np.zeros(400, [("t_us", "i8"), ("x", "u2"), ("y", "u2"), ("on", "?")])
+        events["t_us"] = np.arange(400) * 1000
+        return events
+
+    def make_event_force_file(self):
+        weights = [{"weights": [[0.5] * 2], "biases": [0.0]}, {"weights": [[1.0]], "biases": [0.0]}]
+        return sealed("event-force.json", {
+            "format": "touchstone.grasp_force_model", "version": 1, "error": {"left_out_N": 0.5, "absolute_N": 0.1, "relative": 0.2},
+            "estimator": with_checksum({
+                "format": "touchstone.time_delay_network", "version": 1, "delays": 1,
+                "features": {"low": [0.0, 0.0], "high": [9.0, 9.0]}, "force_N": {"low": [0.0], "high": [1.0]},
+                "network": {"sigmoid": "tanh", "layers": weights}})})
+
+    def make_event_material_file(self):
+        weights = [{"weights": [[0.5] * 88], "biases": [0.0]}, {"weights": [[1.0], [-1.0]], "biases": [0.0, 0.0]}]
+        return sealed("event-material.json", {
+            "format": "touchstone.material_classifier", "version": 1, "materials": ["foam", "wood"],
+            "features": {"low": [0.0] * 88, "high": [9.0] * 88}, "network": {"sigmoid": "tanh", "layers": weights}})
+
+    def make_events_file(self):
+        pathlib.Path("events.txt").write_text("".join(f"{t} 3 4 1\n" for t in range(10)))
+        return "events.txt"
+
+    def make_event_force(self):
+        return ts.EventForceModel.load(self.event_force_file)
 
     def make_reader(self):
         return ts.ColourMarkerReader(markers_picture(), grid=(4, 4))
@@ -607,7 +667,7 @@ def table(t):
             "rest": (dots_picture(), pictures)})],
         "TouchReader": lambda: [Call(lambda: ts.TouchReader, {
             "rest": (rest, pictures), "heights": (heights, only(*STRANGE)), "force": (force, only(*STRANGE)),
-            "indenter": (None, texts), "mm_per_px": (mm_per_px, numbers)},
+            "indenter": (None, lambda valid: texts("ball")), "mm_per_px": (mm_per_px, numbers)},
             after=lambda reader, rest=rest: reader.read(rest) and None)
             for rest, heights, force, mm_per_px in ((dots_picture(), None, t.gel_force, 0.05),
                                                     (dots_picture(), None, None, None))],
@@ -635,6 +695,20 @@ def table(t):
         **{f"TactileMap.{name}": lambda name=name: [Call(lambda: getattr(t.tactile_map(), name), {
             "height_mm": (rough_heights(), arrays), "mm_per_px": (0.05, numbers),
             "contact": (rough_heights() > 0, arrays)})] for name in ("add", "localise")},
+        "EventForceModel.load": lambda: [Call(lambda: ts.EventForceModel.load, {"path": (t.event_force_file, paths)})],
+        "EventForceReader": lambda: [Call(lambda: ts.EventForceReader, {
+            "model": (t.event_force, only(*STRANGE)), "size": ((240, 180), sizes)},
+            after=lambda reader: reader.add(t.events))],
+        "EventForceReader.add": lambda: [Call(lambda: ts.EventForceReader(t.event_force, size=(240, 180)).add, {
+            "events": (t.events, records)})],
+        "EventForceReader.end_at": lambda: [Call(lambda: begun(ts.EventForceReader(t.event_force, size=(240, 180)), t.events)
+                                                 .end_at, {"t_us": (500000, numbers)})],
+        "EventForceReader.restart": lambda: [Call(lambda: ts.EventForceReader(t.event_force, size=(240, 180)).restart)],
+        "EventMaterialModel.load": lambda: [Call(lambda: ts.EventMaterialModel.load,
+                                                 {"path": (t.event_material_file, paths)})],
+        "EventMaterialModel.classify": lambda: [Call(lambda: ts.EventMaterialModel.load(t.event_material_file).classify, {
+            "events": (t.events, records), "size": ((240, 180), sizes)}, refused=True)],
+        "read_events": lambda: [Call(lambda: ts.read_events, {"path": (t.events_file, paths), "size": ((240, 180), sizes)})],
         "StiffnessForceModel.load": lambda: [Call(lambda: ts.StiffnessForceModel.load,
                                                   {"path": (t.stiffness_file, paths)})],
         "StiffnessForceModel.save": lambda: [Call(lambda: t.stiffness.save, {"path": ("y", paths)})],
@@ -705,6 +779,11 @@ def table(t):
 
 def texts_of_shards(valid):
     return ["0/1", "2/1", "1/0", "-1/2", "1/2/3", "1/", "/1", "1/99999999999", "1/2147483647", *texts("1/1")]
+
+
+def begun(reader, events):
+    reader.add(events)
+    return reader
 
 
 def arrays_of_bars(valid):

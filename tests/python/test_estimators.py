@@ -1,5 +1,7 @@
 """Estimators over a user's own arrays; their own tests are in tests/sensors."""
 
+import os
+import subprocess
 import threading
 
 import numpy as np
@@ -268,6 +270,68 @@ def test_touches_are_placed_on_a_map(tmp_path):
                      (dict(contact=np.ones((3, 3))), "contact: is 3 x 3, the heights are 240 x 320")):
         with pytest.raises(ts.Error, match=why):
             tactile_map.localise(strewn(), **{"mm_per_px": 0.05, **bad})
+
+
+def grasp_events(number, start_us=10**9):
+    """Events of a grasp by a formula, and its force in windows of 7 ms: rest, a rise in 22 windows, hold, release."""
+    rng = np.random.default_rng(number)
+    window = np.arange(180)
+    peak, speed = rng.uniform(1.5, 3.5), rng.uniform(0.8, 1.2)
+    force = np.where(window < 30, 0, peak * (1 - np.exp(-3 * speed * (window - 29) / 22)))
+    force = np.where(window >= 152, peak * np.exp(-0.5 * np.clip(window - 151, 0, None)), force)
+    change = 4000 * np.diff(np.sqrt(np.maximum(force, 0) / 3.5), prepend=0)
+    off, on = rng.poisson(20 + np.maximum(change, 0)), rng.poisson(20 + np.maximum(-1.5 * change, 0))
+    t_us = [np.sort(rng.integers(7000 * k, 7000 * (k + 1), off[k] + on[k])) for k in window]
+    t_us[0][0] = 0
+    events = np.empty(sum(map(len, t_us)), [("t_us", "i8"), ("x", "u2"), ("y", "u2"), ("on", "?")])
+    events["t_us"] = np.concatenate(t_us) + start_us
+    events["x"], events["y"] = rng.integers(0, 32, len(events)), rng.integers(0, 24, len(events))
+    events["on"] = np.concatenate([rng.permutation(np.arange(off[k] + on[k]) < on[k]) for k in window])
+    return events, force
+
+
+def write_grasp(folder, number):
+    events, force = grasp_events(number)
+    np.savetxt(folder / f"{number}.txt", np.column_stack([events[name] for name in ("t_us", "x", "y", "on")]), fmt="%d",
+               header="t x y p", comments="# ")
+    middles = 10**9 + 7000 * np.arange(len(force)) + 3500
+    np.savetxt(folder / f"{number}.csv", np.column_stack([middles, force]), fmt="%d,%.5f", header="t_us,force_N",
+               comments="")
+
+
+@pytest.mark.skipif("TOUCHSTONE_PROGRAM" not in os.environ, reason="the command makes the model")
+def test_forces_of_events_are_read_as_they_come(tmp_path):
+    for number in range(8):
+        write_grasp(tmp_path, number)
+    (tmp_path / "grasps.csv").write_text("events,forces,material\n" + "".join(f"{k}.txt,{k}.csv,\n" for k in range(8)))
+    path = str(tmp_path / "force.json")
+    subprocess.run([os.environ["TOUCHSTONE_PROGRAM"], "--quiet", "calibrate", "event-force", "--grasps",
+                    str(tmp_path / "grasps.csv"), "--size", "32x24", "--left-out", "4", "-o", path], check=True)
+    model = ts.EventForceModel.load(path)
+    assert model.method == "process" and 0 < model.left_out_error_N < 0.5
+    events, force = grasp_events(100)
+    reader = ts.EventForceReader(model, size=(32, 24))
+    for part in np.array_split(events, 50):
+        reader.add(part)
+    assert len(reader.force_N) == len(reader.t_us) >= 178
+    assert (np.diff(reader.t_us) == 7000).all() and reader.t_us[0] == events["t_us"][0] + 7000
+    assert not reader.touched[:30].any() and reader.touched[31:].all() and (reader.force_N[:30] == 0).all()
+    off = reader.force_N[31:52] - force[31:52]
+    assert np.sqrt((off**2).mean()) < 0.2 and (abs(off) < 2 * reader.force_error_N[31:52]).mean() > 0.6
+    whole = reader.force_N
+    reader.restart()
+    assert len(reader.force_N) == 0
+    reader.add(events)
+    reader.end_at(10**9 + 2 * 10**6)
+    assert np.array_equal(reader.force_N[:len(whole)], whole) and len(reader.force_N) > len(whole)
+    with pytest.raises(ts.Error, match="event"):
+        reader.add(events[:5])
+    with pytest.raises(ts.Error, match="t_us, x, y and on"):
+        reader.add(events["t_us"])
+    with pytest.raises(ts.Error, match="^size: "):
+        ts.EventForceReader(model, size=(0, 4))
+    read = ts.read_events(str(tmp_path / "3.txt"), size=(32, 24))
+    assert np.array_equal(read, grasp_events(3)[0])
 
 
 def markers_picture(shift=(0.0, 0.0), side=16.0, spacing=40.0, grid=4):

@@ -55,6 +55,24 @@ inline SyntheticGrasp synthetic_grasp(int index, int material, double noise_per_
   return grasp;
 }
 
+/// The same counts as events: evenly within each window of 7 ms from `start_us` on, the first at its very begin; at
+/// places that go round a camera of 32 x 24.
+inline std::vector<Event> events_of(const SyntheticGrasp& grasp, std::int64_t start_us = 0) {
+  std::vector<Event> events;
+  for (std::size_t window = 0; window < grasp.windows.size(); ++window) {
+    const EventCounts& counts = grasp.windows[window];
+    const std::int64_t all = counts.on + counts.off;
+    for (std::int64_t k = 0; k < all; ++k) {
+      const auto place = static_cast<int>((17 * k) % (32 * 24));
+      // ON and OFF mixed in their shares.
+      const bool on = (k + 1) * counts.on / all > k * counts.on / all;
+      events.push_back({start_us + 7000 * static_cast<std::int64_t>(window) + 7000 * k / all,
+                        static_cast<std::uint16_t>(place % 32), static_cast<std::uint16_t>(place / 32), on});
+    }
+  }
+  return events;
+}
+
 inline ForceSeries synthetic_series(const SyntheticGrasp& grasp, bool with_time) {
   const GraspSequence sequence = grasp_sequence(grasp.windows, find_grasp_phases(grasp.windows));
   const int first = find_grasp_phases(grasp.windows).first_touch;
