@@ -112,25 +112,7 @@ std::optional<RigidTransform> Press::Parts::straight_above(std::size_t body, Rig
 /// The part of the path from `begin` to `end` (shares of the whole), halved where it doesn't converge.
 std::optional<PressSnapshot> Press::Parts::advance(const Path& path, const PressSnapshot& from, double begin,
                                                    double end, int halvings, Effort& effort) {
-  std::vector<PartTarget> targets(path.to);
-  for (std::size_t b = 0; b < targets.size(); ++b) {
-    PartTarget& target = targets[b];
-    const BodySnapshot& start = path.start.bodies[b];
-    target.pose = between(start.pose, path.to[b].pose, end);
-    for (int a = 0; a < 3; ++a) {
-      if (target.forced[a]) target.pose.translation[a] = from.bodies[b].pose.translation[a];
-    }
-    const bool turned = target.turned[0] || target.turned[1] || target.turned[2];
-    if (turned) {
-      // What torque has turned the body by since the path's start comes on top of the path.
-      const Eigen::Matrix3d so_far = between(start.pose, path.to[b].pose, begin).rotation;
-      target.pose.rotation = from.bodies[b].pose.rotation * so_far.transpose() * target.pose.rotation;
-    }
-    if (end < 1.0) {
-      target.force = start.force + end * (target.force - start.force);
-      target.torque = torque_on(start) + end * (target.torque - torque_on(start));
-    }
-  }
+  const std::vector<PartTarget> targets = targets_along(path.start.bodies, path.to, from.bodies, begin, end);
   if (auto next = solver.solve(from, targets, (end - begin) * path.seconds, effort.part)) {
     ++effort.parts;
     return next;
@@ -167,11 +149,7 @@ std::optional<RigidTransform> Press::Parts::before_touch(std::size_t body, const
   }
   const RigidTransform& here = now.bodies[body].pose;
   if (!placed[body] || !(deepest_at(body, here) >= 0.0)) return straight_above(body, to).value_or(to);
-  double overlapping = 1.0;
-  for (int k = 0; k < 50; ++k) {
-    const double middle = 0.5 * (clear + overlapping);
-    (deepest_at(body, between(here, to, middle)) < 0.0 ? overlapping : clear) = middle;
-  }
+  clear = share_before_overlap(here, to, [&](const RigidTransform& pose) { return deepest_at(body, pose) < 0.0; });
   return between(here, to, clear);
 }
 

@@ -103,4 +103,26 @@ Eigen::Vector3d torque_on(const BodySnapshot& body) {
   return body.moment - body.pose.translation.cross(body.force);
 }
 
+std::vector<PartTarget> targets_along(const std::vector<BodySnapshot>& start, const std::vector<PartTarget>& to,
+                                      const std::vector<BodySnapshot>& from, double begin, double end) {
+  std::vector<PartTarget> targets(to);
+  for (std::size_t b = 0; b < targets.size(); ++b) {
+    PartTarget& target = targets[b];
+    target.pose = between(start[b].pose, to[b].pose, end);
+    for (int a = 0; a < 3; ++a) {
+      if (target.forced[a]) target.pose.translation[a] = from[b].pose.translation[a];
+    }
+    if (target.turned[0] || target.turned[1] || target.turned[2]) {
+      // What torque has turned the body by since the path's start comes on top of the path.
+      const Eigen::Matrix3d so_far = between(start[b].pose, to[b].pose, begin).rotation;
+      target.pose.rotation = from[b].pose.rotation * so_far.transpose() * target.pose.rotation;
+    }
+    if (end < 1.0) {
+      target.force = start[b].force + end * (target.force - start[b].force);
+      target.torque = torque_on(start[b]) + end * (target.torque - torque_on(start[b]));
+    }
+  }
+  return targets;
+}
+
 }  // namespace touchstone::fem

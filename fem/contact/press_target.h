@@ -2,6 +2,7 @@
 // What a press's target asks of its parts, in linear elasticity and at finite strain.
 
 #include <Eigen/Core>
+#include <vector>
 
 #include "fem/contact/contact_gap.h"
 #include "fem/contact/press.h"
@@ -30,5 +31,23 @@ void leave_free_axes(const ContactSurface& surface, double friction, PartTarget&
 
 /// N mm, on the body about its own origin.
 Eigen::Vector3d torque_on(const BodySnapshot& body);
+
+/// The part's targets on a straight path from `start` to `to`, at its share `end`, for bodies that are at `from`, its
+/// share `begin`: forces and torques go from those at the start, forced axes begin where the bodies are.
+std::vector<PartTarget> targets_along(const std::vector<BodySnapshot>& start, const std::vector<PartTarget>& to,
+                                      const std::vector<BodySnapshot>& from, double begin, double end);
+
+/// The share of the straight path from `from`, where the body is clear, to `to`, where it overlaps, up to which it is
+/// clear, by halving. `overlaps(pose)` says whether it does.
+template <typename Overlaps>
+double share_before_overlap(const RigidTransform& from, const RigidTransform& to, const Overlaps& overlaps) {
+  double clear = 0.0;
+  double overlapping = 1.0;
+  for (int k = 0; k < 50; ++k) {
+    const double middle = 0.5 * (clear + overlapping);
+    (overlaps(between(from, to, middle)) ? overlapping : clear) = middle;
+  }
+  return clear;
+}
 
 }  // namespace touchstone::fem

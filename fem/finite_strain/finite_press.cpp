@@ -105,25 +105,7 @@ void FinitePress::Parts::refuse_path_through(int body, const RigidTransform& pos
 std::optional<FiniteSnapshot> FinitePress::Parts::advance(const FiniteSnapshot& start,
                                                           const std::vector<PartTarget>& to, const FiniteSnapshot& from,
                                                           double begin, double end, int halvings, Effort& effort) {
-  std::vector<PartTarget> parts = to;
-  for (std::size_t b = 0; b < to.size(); ++b) {
-    PartTarget& part = parts[b];
-    const BodySnapshot& begun = start.bodies[b];
-    const BodySnapshot& here = from.bodies[b];
-    part.pose = between(begun.pose, to[b].pose, end);
-    for (int a = 0; a < 3; ++a) {
-      if (part.forced[a]) part.pose.translation[a] = here.pose.translation[a];
-    }
-    if (part.turned[0] || part.turned[1] || part.turned[2]) {
-      // What torque has turned the body by since the path's start comes on top of the path.
-      const Eigen::Matrix3d so_far = between(begun.pose, to[b].pose, begin).rotation;
-      part.pose.rotation = here.pose.rotation * so_far.transpose() * part.pose.rotation;
-    }
-    if (end < 1.0) {
-      part.force = begun.force + end * (to[b].force - begun.force);
-      part.torque = torque_on(begun) + end * (to[b].torque - torque_on(begun));
-    }
-  }
+  const std::vector<PartTarget> parts = targets_along(start.bodies, to, from.bodies, begin, end);
   if (auto next = solver.solve(from, parts, effort.part)) {
     ++effort.parts;
     return next;
@@ -188,11 +170,8 @@ double FinitePress::Parts::add_segment(int b, const PressTarget& target, Path& p
       clear = 0.0;
       start.pose = straight_above(b, to.pose).value_or(to.pose);
       if (placed && !(solver.overlap(b, here.pose) > 0.0)) {
-        double overlapping = 1.0;
-        for (int k = 0; k < 50; ++k) {
-          const double middle = 0.5 * (clear + overlapping);
-          (solver.overlap(b, between(here.pose, to.pose, middle)) > 0.0 ? overlapping : clear) = middle;
-        }
+        clear = share_before_overlap(here.pose, to.pose,
+                                     [&](const RigidTransform& pose) { return solver.overlap(b, pose) > 0.0; });
         start.pose = between(here.pose, to.pose, clear);
       }
     }

@@ -49,11 +49,11 @@ TestedGrasp test(const Estimator& estimator, const sensors::ForceSeries& series)
     return tested;
   }
   const Eigen::MatrixXd judged = series.features(series.judged, Eigen::all);
-  const sensors::GaussianProcessPrediction told =
+  const sensors::GaussianProcessPrediction predicted =
       sensors::predict_with_variance(std::get<sensors::GaussianProcess>(estimator), judged);
   for (std::size_t i = 0; i < series.judged.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i);
-    note(told.mean[at], series.judged[i], told.variance[at]);
+    note(predicted.mean[at], series.judged[i], predicted.variance[at]);
   }
   return tested;
 }

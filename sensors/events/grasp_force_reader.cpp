@@ -60,10 +60,10 @@ void GraspForceReader::estimate(WindowForce& window) {
     window.force_N = network_->next(std::span(inputs.data(), 2));
     window.extrapolates = network_->extrapolates();
   } else {
-    const GaussianProcessPrediction told =
+    const GaussianProcessPrediction predicted =
         predict_with_variance(std::get<GaussianProcess>(model_.estimator), inputs.transpose());
-    window.force_N = told.mean[0];
-    variance = told.variance[0];
+    window.force_N = predicted.mean[0];
+    variance = predicted.variance[0];
     window.extrapolates = (inputs.array() > most_.array()).any();
   }
   window.sigma_N = model_.sigma_N(window.force_N, variance);

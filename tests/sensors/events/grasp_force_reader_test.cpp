@@ -7,7 +7,6 @@
 
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 #include "sensors/events/force_readings.h"
 #include "sensors/events/grasp_force_model_file.h"
@@ -24,12 +23,6 @@ using test::message_of;
 using testing::HasSubstr;
 
 const EventWindowSettings kWindows{.start_us = 5000, .size = {32, 24}};
-
-std::vector<int> range(int begin, int end) {
-  std::vector<int> indices(static_cast<std::size_t>(end - begin));
-  std::iota(indices.begin(), indices.end(), begin);
-  return indices;
-}
 
 /// Grasps of one material: then counts tell the force, but for their noise.
 std::vector<ForceSeries> one_material(int count, bool with_time) {

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numeric>
 
 #include "sensors/learning/confusion_matrix.h"
 #include "sensors/learning/leave_one_out.h"
@@ -18,12 +17,6 @@ using test::message_of;
 using testing::HasSubstr;
 
 const std::vector<std::string> kMaterials{"foam", "rubber", "silicone", "steel"};
-
-std::vector<int> range(int begin, int end) {
-  std::vector<int> indices(static_cast<std::size_t>(end - begin));
-  std::iota(indices.begin(), indices.end(), begin);
-  return indices;
-}
 
 TEST(MaterialClassifier, CrossEntropyAndItsDerivatives) {
   Eigen::MatrixXd outputs = (Eigen::MatrixXd(3, 2) << 1.0, 0.0, 2.0, 0.0, -1.0, 0.0).finished();

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 #include "core/random.h"
@@ -16,6 +17,13 @@
 #include "sensors/events/material_classifier.h"
 
 namespace touchstone::sensors {
+
+/// The whole numbers from `begin` to before `end`.
+inline std::vector<int> range(int begin, int end) {
+  std::vector<int> indices(static_cast<std::size_t>(end - begin));
+  std::iota(indices.begin(), indices.end(), begin);
+  return indices;
+}
 
 struct SyntheticGrasp {
   std::vector<EventCounts> windows;

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numeric>
 
 #include "sensors/events/force_score.h"
 #include "sensors/learning/leave_one_out.h"
@@ -16,12 +15,6 @@ namespace {
 
 using test::message_of;
 using testing::HasSubstr;
-
-std::vector<int> range(int begin, int end) {
-  std::vector<int> indices(static_cast<std::size_t>(end - begin));
-  std::iota(indices.begin(), indices.end(), begin);
-  return indices;
-}
 
 TimeDelayNetworkSettings small_settings() {
   TimeDelayNetworkSettings settings;

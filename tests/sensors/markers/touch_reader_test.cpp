@@ -8,18 +8,15 @@
 #include <opencv2/core.hpp>
 
 #include "core/error.h"
-#include "sensors/heights/height_calibration.h"
 #include "tests/sensors/heights/painted_gel.h"
+#include "tests/sensors/markers/painted_marked_gel.h"
 #include "tests/sensors/markers/painted_markers.h"
 
 namespace touchstone::sensors {
 namespace {
 
-constexpr int kWidth = 240;
-constexpr int kHeight = 180;
-constexpr double kScale = 0.053;
 const Eigen::Vector2d kCentre_px(120, 90);
-const fixtures::Ball kBall{kScale * kCentre_px, 6.0, 2.2};
+const fixtures::Ball kBall{kGelScale_mm * kCentre_px, 6.0, 2.2};
 
 LinearForce line(double newton_per_unit) {
   LinearForce force;
@@ -31,13 +28,8 @@ class TouchReaderTest : public ::testing::Test {
  protected:
   TouchReaderTest() {
     static const HeightModel model = [] {
-      fixtures::GelPainter painter(kWidth, kHeight, kScale, {});
-      HeightCalibrationSettings settings;
-      settings.mm_per_px = kScale;
-      settings.table.most_cells = 1U << 15U;
-      settings.correction = LightCorrection::none;
-      settings.cross_validate = false;
-      return calibrate_height(painter.presses(2, 2, 1.0, 0.75), painter.background(), settings).model;
+      fixtures::GelPainter painter(kGelWidth, kGelHeight, kGelScale_mm, {});
+      return small_height_model(painter);
     }();
     calibration_.height = model;
     calibration_.background = frame(nothing, rest_);
@@ -49,7 +41,7 @@ class TouchReaderTest : public ::testing::Test {
   cv::Mat frame(const fixtures::Field& field, const std::vector<Eigen::Vector2d>& places) {
     cv::Mat picture = painter_.paint(field);
     const cv::Mat ink =
-        fixtures::paint_markers({.width = kWidth, .height = kHeight, .brightness = 255, .shading = 0}, places);
+        fixtures::paint_markers({.width = kGelWidth, .height = kGelHeight, .brightness = 255, .shading = 0}, places);
     cv::multiply(picture, ink, picture, 1.0 / 255);
     return picture;
   }
@@ -64,8 +56,8 @@ class TouchReaderTest : public ::testing::Test {
   static fixtures::Relief nothing(const Eigen::Vector2d&) { return {}; }
   static fixtures::Relief ball(const Eigen::Vector2d& place) { return kBall.at(place); }
 
-  fixtures::GelPainter painter_{kWidth, kHeight, kScale, {}};
-  std::vector<Eigen::Vector2d> rest_ = fixtures::marker_grid(22.6, kWidth, kHeight);
+  fixtures::GelPainter painter_{kGelWidth, kGelHeight, kGelScale_mm, {}};
+  std::vector<Eigen::Vector2d> rest_ = fixtures::marker_grid(22.6, kGelWidth, kGelHeight);
   TouchCalibration calibration_;
 };
 
@@ -94,8 +86,8 @@ TEST_F(TouchReaderTest, ABallsDepthForceAndShearAreThoseOfTheFormula) {
   ASSERT_TRUE(touch.patch);
   EXPECT_LT((touch.patch->centre - kCentre_px).norm(), 3.0);
   EXPECT_NEAR(touch.height_max_mm, kBall.at(kBall.centre_mm).height, 0.15 * touch.height_max_mm);
-  EXPECT_NEAR(*touch.normal_N, 0.1 * height_sum_mm3(truth, kScale), 0.15 * *touch.normal_N);
-  EXPECT_LT((*touch.shear_N - 2.0 * kScale * shift).norm(), 0.02 * touch.shear_N->norm());
+  EXPECT_NEAR(*touch.normal_N, 0.1 * height_sum_mm3(truth, kGelScale_mm), 0.15 * *touch.normal_N);
+  EXPECT_LT((*touch.shear_N - 2.0 * kGelScale_mm * shift).norm(), 0.02 * touch.shear_N->norm());
   ASSERT_TRUE(touch.force_ratio);
   EXPECT_NEAR(*touch.force_ratio, touch.shear_N->norm() / *touch.normal_N, 1e-12);
   EXPECT_FALSE(touch.rim.slips());  // all moved as one
@@ -121,16 +113,16 @@ TEST_F(TouchReaderTest, GreyFramesAreReadWithoutHeights) {
     cv::extractChannel(colour, channel, 1);
     return channel;
   };
-  TouchReader reader({.background = grey(calibration_.background), .shear = line(2.0), .mm_per_px = kScale});
+  TouchReader reader({.background = grey(calibration_.background), .shear = line(2.0), .mm_per_px = kGelScale_mm});
   const Eigen::Vector2d shift(2.4, -1.8);
   const TouchReading& touch = reader.read({grey(frame(ball, moved([&](double) { return shift; }))), 1});
   ASSERT_TRUE(touch.patch);
-  EXPECT_LT((*touch.shear_N - 2.0 * kScale * shift).norm(), 0.02 * touch.shear_N->norm());
+  EXPECT_LT((*touch.shear_N - 2.0 * kGelScale_mm * shift).norm(), 0.02 * touch.shear_N->norm());
   EXPECT_THROW(reader.read({frame(ball, rest_), 2}), Error);
 }
 
 TEST_F(TouchReaderTest, AForceBeyondTheSamplesIsSaidToBe) {
-  calibration_.shear->highest_seen = 3.5 * kScale;
+  calibration_.shear->highest_seen = 3.5 * kGelScale_mm;
   calibration_.normal->highest_seen = 1e3;
   TouchReader reader(calibration_);
   for (const double far : {3.0, 4.0}) {
@@ -141,7 +133,7 @@ TEST_F(TouchReaderTest, AForceBeyondTheSamplesIsSaidToBe) {
 
 TEST_F(TouchReaderTest, ARimThatStaysBehindIsSlipUntilItIsForgotten) {
   TouchReader reader(calibration_);
-  const double rim_px = kBall.contact_mm / kScale;
+  const double rim_px = kBall.contact_mm / kGelScale_mm;
   const auto with_step = [&](int step) {
     return frame(ball, moved([&](double distance) {
                    return Eigen::Vector2d(1.5 * step * std::max(0.0, 1.0 - std::pow(distance / rim_px, 2)), 0.0);
@@ -159,11 +151,11 @@ TEST_F(TouchReaderTest, WhatCannotBeReadIsRefused) {
   reader.read({frame(nothing, rest_), 5});
   EXPECT_THROW(reader.read({frame(nothing, rest_), 5}), Error);
   EXPECT_THROW(reader.read({cv::Mat(90, 120, CV_8UC3, cv::Scalar(90, 90, 90)), 6}), Error);
-  EXPECT_THROW(reader.read({cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(90)), 6}), Error);
+  EXPECT_THROW(reader.read({cv::Mat(kGelHeight, kGelWidth, CV_8UC1, cv::Scalar(90)), 6}), Error);
   EXPECT_FALSE(reader.read({frame(nothing, rest_), 6}).patch);
   EXPECT_THROW(TouchReader(calibration_, {.least_patch_px = 0}), Error);
   TouchCalibration bad = calibration_;
-  bad.background = cv::Mat(kHeight, kWidth, CV_8UC3, cv::Scalar(90, 90, 90));  // no markers
+  bad.background = cv::Mat(kGelHeight, kGelWidth, CV_8UC3, cv::Scalar(90, 90, 90));  // no markers
   EXPECT_THROW(TouchReader{bad}, Error);
   bad = calibration_;
   bad.height.reset();
@@ -172,7 +164,7 @@ TEST_F(TouchReaderTest, WhatCannotBeReadIsRefused) {
   EXPECT_THROW(TouchReader{bad}, Error);  // shear without a scale
   bad.mm_per_px = -1.0;
   EXPECT_THROW(TouchReader{bad}, Error);
-  bad.mm_per_px = kScale;
+  bad.mm_per_px = kGelScale_mm;
   EXPECT_NO_THROW(TouchReader{bad});
   bad = calibration_;
   bad.background = calibration_.background(cv::Rect(0, 0, 200, 150)).clone();
