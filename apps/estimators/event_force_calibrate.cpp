@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "apps/command.h"
-#include "apps/event_options.h"
+#include "apps/estimators/event_options.h"
 #include "apps/progress_bar.h"
 #include "lab/dvs/grasp_calibration.h"
 #include "sensors/events/grasp_force_model_file.h"
@@ -22,13 +22,7 @@ void calibrate(const CalibrateOptions& options, const EventOptions& events, cons
   lab::GraspForceTraining training = options.training;
   training.threads = global.threads;
   if (options.method == "network") training.method = lab::GraspForceMethod::network;
-  const auto table = lab::read_grasp_table(options.grasps, lab::GraspNeeds::forces);
-  lab::SeenGrasps grasps;
-  {
-    ProgressBar bar(global.quiet);
-    grasps = lab::read_grasps(table, read_options(events), bar.listener());
-  }
-  warn_of_faults(grasps.faults);
+  const lab::SeenGrasps grasps = seen_grasps(options.grasps, lab::GraspNeeds::forces, events, global);
   lab::GraspForceCalibration made;
   {
     ProgressBar bar(global.quiet);

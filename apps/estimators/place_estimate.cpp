@@ -3,8 +3,8 @@
 #include <memory>
 
 #include "apps/command.h"
+#include "apps/estimators/surface_options.h"
 #include "apps/progress_bar.h"
-#include "apps/surface_options.h"
 #include "core/whole_file.h"
 #include "lab/gelsight/place_table.h"
 #include "sensors/touch_map/tactile_map_file.h"

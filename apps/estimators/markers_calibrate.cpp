@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "apps/command.h"
-#include "apps/marker_options.h"
+#include "apps/estimators/marker_options.h"
 #include "apps/progress_bar.h"
 #include "core/error.h"
 #include "lab/gelsight/touch_force_calibration.h"

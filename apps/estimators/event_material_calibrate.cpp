@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "apps/command.h"
-#include "apps/event_options.h"
+#include "apps/estimators/event_options.h"
 #include "apps/progress_bar.h"
 #include "lab/dvs/grasp_calibration.h"
 #include "sensors/events/material_classifier_file.h"
@@ -18,13 +18,7 @@ struct CalibrateOptions {
 
 void calibrate(const CalibrateOptions& options, const EventOptions& events, const GlobalOptions& global) {
   require_writable_place(options.out);
-  const auto table = lab::read_grasp_table(options.grasps, lab::GraspNeeds::materials);
-  lab::SeenGrasps grasps;
-  {
-    ProgressBar bar(global.quiet);
-    grasps = lab::read_grasps(table, read_options(events), bar.listener());
-  }
-  warn_of_faults(grasps.faults);
+  const lab::SeenGrasps grasps = seen_grasps(options.grasps, lab::GraspNeeds::materials, events, global);
   lab::GraspMaterialCalibration made;
   {
     ProgressBar bar(global.quiet);

@@ -3,8 +3,8 @@
 #include <memory>
 #include <optional>
 
-#include "apps/chroma_grid.h"
 #include "apps/command.h"
+#include "apps/estimators/chroma_grid.h"
 #include "apps/progress_bar.h"
 #include "datasets/sets/frame_sequence.h"
 #include "lab/chroma/chroma_fields.h"

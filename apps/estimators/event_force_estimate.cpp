@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "apps/command.h"
-#include "apps/event_options.h"
+#include "apps/estimators/event_options.h"
 #include "apps/progress_bar.h"
 #include "lab/dvs/grasp_estimates.h"
 #include "sensors/events/grasp_force_model_file.h"

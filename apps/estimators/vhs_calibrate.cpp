@@ -1,7 +1,7 @@
 #include <memory>
 
 #include "apps/command.h"
-#include "apps/tracker_options.h"
+#include "apps/estimators/tracker_options.h"
 #include "core/error.h"
 #include "sensors/beads/stiffness_model_file.h"
 

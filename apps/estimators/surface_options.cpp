@@ -1,4 +1,4 @@
-#include "apps/surface_options.h"
+#include "apps/estimators/surface_options.h"
 
 #include "core/error.h"
 #include "sensors/heights/height_model_file.h"

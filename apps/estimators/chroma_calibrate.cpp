@@ -3,8 +3,8 @@
 #include <memory>
 #include <set>
 
-#include "apps/chroma_grid.h"
 #include "apps/command.h"
+#include "apps/estimators/chroma_grid.h"
 #include "core/error.h"
 #include "core/units.h"
 #include "lab/chroma/chroma_fields.h"

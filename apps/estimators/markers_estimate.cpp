@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "apps/command.h"
-#include "apps/marker_options.h"
+#include "apps/estimators/marker_options.h"
 #include "apps/progress_bar.h"
 #include "core/error.h"
 #include "lab/gelsight/marker_tracks.h"

@@ -1,5 +1,6 @@
-#include "apps/event_options.h"
+#include "apps/estimators/event_options.h"
 
+#include "apps/progress_bar.h"
 #include "core/error.h"
 #include "datasets/sets/csv_cells.h"
 
@@ -27,6 +28,18 @@ sensors::EventReadOptions read_options(const EventOptions& options) {
   }
   read.size = cv::Size(*width, *height);
   return read;
+}
+
+lab::SeenGrasps seen_grasps(const std::filesystem::path& table, lab::GraspNeeds needs, const EventOptions& options,
+                            const GlobalOptions& global) {
+  const auto listed = lab::read_grasp_table(table, needs);
+  lab::SeenGrasps grasps;
+  {
+    ProgressBar bar(global.quiet);
+    grasps = lab::read_grasps(listed, read_options(options), bar.listener());
+  }
+  warn_of_faults(grasps.faults);
+  return grasps;
 }
 
 }  // namespace touchstone::apps

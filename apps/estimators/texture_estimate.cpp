@@ -4,8 +4,8 @@
 #include <memory>
 
 #include "apps/command.h"
+#include "apps/estimators/surface_options.h"
 #include "apps/progress_bar.h"
-#include "apps/surface_options.h"
 #include "lab/gelsight/texture_table.h"
 #include "sensors/texture/texture_model_file.h"
 

@@ -1,4 +1,4 @@
-#include "apps/tracker_options.h"
+#include "apps/estimators/tracker_options.h"
 
 #include <spdlog/spdlog.h>
 

@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "apps/command.h"
-#include "apps/event_options.h"
+#include "apps/estimators/event_options.h"
 #include "apps/progress_bar.h"
 #include "lab/dvs/grasp_estimates.h"
 #include "sensors/events/material_classifier_file.h"

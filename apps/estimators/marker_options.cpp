@@ -1,4 +1,4 @@
-#include "apps/marker_options.h"
+#include "apps/estimators/marker_options.h"
 
 #include <optional>
 

@@ -1,4 +1,4 @@
-#include "apps/chroma_grid.h"
+#include "apps/estimators/chroma_grid.h"
 
 #include "core/error.h"
 #include "datasets/sets/csv_cells.h"
