@@ -53,6 +53,7 @@ double square_error_of(const DirectError& error) {
 
 constexpr double kStandardErrors = 2.0;
 constexpr std::array kTimesThePaths = {1, 4, 16};  // the last one of what is seen alone
+constexpr double kWorthMoreRays = 0.9;             // of the error with fewer, where neither is within the tolerance
 
 }  // namespace
 
@@ -122,6 +123,25 @@ DirectError plain_error_beside(const std::array<cv::Mat, 2>& traced, const cv::M
 
 namespace {
 
+/// Root mean square of one picture's noise, from the difference of two.
+double noise_between(const std::array<cv::Mat, 2>& traced, const cv::Mat& mask, bool in_parts) {
+  const int channels = traced[0].channels();
+  double squares = 0.0;
+  double power = 0.0;
+  for (int row = 0; row < mask.rows; ++row) {
+    for (int column = 0; column < mask.cols; ++column) {
+      if (mask.at<unsigned char>(row, column) == 0) continue;
+      for (int k = channels * column; k < channels * (column + 1); ++k) {
+        const double a = traced[0].ptr<float>(row)[k];
+        const double b = traced[1].ptr<float>(row)[k];
+        squares += 0.5 * (a - b) * (a - b);
+        power += a * b;
+      }
+    }
+  }
+  return std::sqrt(squares / (in_parts ? power : static_cast<double>(cv::countNonZero(mask)) * channels));
+}
+
 /// A scene's pixels by paths, traced when first asked for: pictures of several renderers stand beside them.
 class Reference {
  public:
@@ -139,6 +159,21 @@ class Reference {
   DirectError seen_error_of(const cv::Mat& picture, int times) {
     const std::array<cv::Mat, 2>& both = traced(times);
     return plain_error_beside({settings_.seen(both[0]), settings_.seen(both[1])}, settings_.seen(picture), mask_);
+  }
+
+  /// What `paths` a pixel would leave, in the unit of the error that decides, from what was traced with the nearest
+  /// number: stratified paths' noise falls faster than the root.
+  double noise_of(int paths) const {
+    const auto apart = [&](int times) {
+      return std::abs(std::log(static_cast<double>(times) * settings_.samples / paths));
+    };
+    const auto nearest = std::min_element(
+        traced_.begin(), traced_.end(), [&](const auto& a, const auto& b) { return apart(a.first) < apart(b.first); });
+    const auto& [times, both] = *nearest;
+    const double noise = settings_.seen
+                             ? noise_between({settings_.seen(both[0]), settings_.seen(both[1])}, mask_, false)
+                             : noise_between(both, mask_, true);
+    return noise * std::sqrt(static_cast<double>(times) * settings_.samples / paths);
   }
 
  private:
@@ -213,12 +248,13 @@ DirectChoice choose_direct(const Scene& rest, const Scene& first, const Camera& 
   if (tried.empty()) tried.push_back(settings.direct.samples);
   Reference reference(first, camera, settings.error);
   cv::Mat traced_rest;
-  std::unique_ptr<DirectRenderer> renderer;
+  DirectChoice least;  // of those that aren't within the tolerance
+  double least_rms = 0.0;
   for (const int samples : tried) {
     DirectSettings drawing = settings.direct;
     drawing.samples = choice.samples = samples;
     const bool whatever = settings.whatever && samples == tried.back();
-    renderer = std::make_unique<DirectRenderer>(field, camera, direct, drawing);
+    auto renderer = std::make_unique<DirectRenderer>(field, camera, direct, drawing);
     if (rest.interreflection) {
       if (traced_rest.empty()) traced_rest = trace_rest(rest, camera, settings.rest);
       choice.bounced = measure_rest_light(*renderer, rest, camera, traced_rest, settings.rest);
@@ -234,10 +270,19 @@ DirectChoice choose_direct(const Scene& rest, const Scene& first, const Camera& 
       if (whatever || !open) break;
     }
     if (whatever || largest_rms(deciding) <= settings.tolerance) {
+      choice.paths_noise.reset();
       choice.renderer = std::move(renderer);
       break;
     }
+    if (settings.paths == 0) continue;
+    choice.paths_noise = reference.noise_of(settings.paths);
+    if (deciding.rms < *choice.paths_noise && (!least.renderer || deciding.rms < kWorthMoreRays * least_rms)) {
+      least_rms = deciding.rms;
+      least = {std::move(renderer), {},      choice.error, choice.seen_error,
+               choice.paths_noise,  samples, {},           choice.bounced};
+    }
   }
+  if (!choice.renderer && least.renderer) choice = std::move(least);
   choice.field = std::move(field);
   if (!choice.renderer && choice.seen_error) {
     choice.reason = fmt::format("the picture is {:.2f} +- {:.2f} off, {:.2f} are asked for", choice.seen_error->rms,

@@ -57,7 +57,10 @@ struct DirectChoice {
   DirectError error;  ///< of `first`, if it was drawn, with the last number of rays that was tried
   /// The same as DirectErrorSettings::seen has it, in its unit, where that is given: it decides then.
   std::optional<DirectError> seen_error;
-  int samples = 0;  ///< that number
+  /// What DirectChoiceSettings::paths would leave, in the unit of the error that decides, where they are given and
+  /// direct light isn't within the tolerance.
+  std::optional<double> paths_noise;
+  int samples = 0;  ///< the number of rays that was tried last, or is taken
   /// What the renderer was made of, for further ones that draw the same pictures: with the camera and `rest` without
   /// interreflection, and set_bounced_light with `rest`.
   LightField field;
@@ -68,6 +71,9 @@ struct DirectChoice {
 struct DirectChoiceSettings {
   double tolerance = 0.015;  ///< of the root mean square difference: what largest_rms may be, of the error that decides
   bool whatever = false;     ///< the error is measured, but any will do: of several numbers of rays the last
+  /// A pixel, that are traced where direct light isn't chosen. Where nothing is within the tolerance but direct light
+  /// is nearer than the noise of so many paths, it's chosen. 0: it isn't then.
+  int paths = 0;
   DirectSettings direct;
   /// Rays a pixel that are tried in turn, in place of direct.samples, until the tolerance holds; empty: those alone.
   /// Light field and paths serve them all.

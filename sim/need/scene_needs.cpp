@@ -11,6 +11,7 @@
 #include "sim/need/press_needs.h"
 #include "sim/plan/change_units.h"
 #include "sim/press/gel_setup.h"
+#include "sim/scene/light_limits.h"
 
 namespace touchstone::sim {
 namespace {
@@ -18,7 +19,7 @@ namespace {
 using nlohmann::json;
 
 /// Raised with each change of how needs are measured, or of their file.
-constexpr int kNeedFormat = 5;
+constexpr int kNeedFormat = 6;
 
 std::string text_of(const SceneNeeds& needs) {
   json all = json::array();
@@ -112,7 +113,7 @@ SceneNeeds measure_needs(const SceneSpec& wanted, const fem::Compliance& gel, co
                            needs);
   }
   stage(3);
-  if (plan.camera) add_picture_needs(scene, plan, gel, truths, frames, settings, needs);
+  if (plan.camera) add_picture_needs(scene, plan, gel, truths, frames, settings, light_limits(wanted), needs);
   stage(kStages);
   return needs;
 }

@@ -42,6 +42,9 @@ struct EffectNeed {
 /// The name of what isn't an effect but changes forces as one: a finer mesh than the device's.
 inline constexpr const char* kFinerMesh = "finer mesh";
 
+/// The same of pixels that are traced: more paths than light_limits allows, or until less noise.
+inline constexpr const char* kMorePaths = "more paths";
+
 /// Of a scene.
 using SceneNeeds = std::vector<EffectNeed>;
 

@@ -12,8 +12,8 @@
 #include "sim/plan/plan_pipeline.h"
 #include "sim/plan/plan_table.h"
 #include "sim/plan/plan_time.h"
+#include "sim/plan/plan_warnings.h"
 #include "sim/plan/scene_bands.h"
-#include "sim/plan/size_doubt.h"
 #include "sim/scene/device_gel.h"
 #include "sim/scene/device_imager.h"
 #include "sim/scene/translucent_coat.h"
@@ -453,24 +453,6 @@ void plan_light(const SceneSpec& scene, Plan& plan, PlanTable& table) {
                 "a few milliseconds a frame");
 }
 
-/// What no effect can change: where the mesh alone is off by more than is allowed.
-void warn_of_mesh(const SceneSpec& scene, const SceneNeeds& needs, Plan& plan) {
-  const std::optional<AccuracySpec> stated = merged(scene.accuracy, scene.device.accuracy);
-  const Change* finer = change_of(needs, kFinerMesh);
-  if (!stated || finer == nullptr) return;
-  const Accuracy allowed = *accuracy_of(scene.accuracy, scene.device.accuracy);
-  if (!exceeds(*finer, allowed)) return;
-  const MeshSpec& mesh = scene.device.mesh;
-  const std::string words = fmt::format(
-      "accuracy.force_percent is {:.3g}, but the mesh itself is off by {:.2g} % of a force (one standard error, in the "
-      "hardest states): that is the least to be had with {}; smaller edges give less, or `mesh.force_error: {:.2g}`",
-      allowed.force_percent, *finer->force_percent,
-      mesh.force_error ? fmt::format("mesh.force_error of {:.2g}", *mesh.force_error)
-                       : fmt::format("edges of {:.3g} mm", mesh.fine_mm),
-      0.01 * allowed.force_percent);
-  plan.warnings.emplace_back(Error(stated->where, words).what());
-}
-
 }  // namespace
 
 double interreflection_estimate(const GelSpec& gel, const PlateSpec& plate, double albedo, double disc_radius_mm) {
@@ -512,11 +494,7 @@ Plan make_plan(const SceneSpec& scene, const SceneNeeds& needs) {
     plan_paths(scene, plan, table);
     plan_shared_paths(scene, plan, table);
   }
-  for (const MovedObject& moved : moved_objects(scene)) {
-    std::string doubt = size_doubt(scene.device, moved.object);
-    if (!doubt.empty()) plan.warnings.push_back(std::move(doubt));
-  }
-  warn_of_mesh(scene, needs, plan);
+  add_warnings(scene, needs, plan);
   return plan;
 }
 

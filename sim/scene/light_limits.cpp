@@ -12,7 +12,6 @@ namespace touchstone::sim {
 namespace {
 
 constexpr double kVarianceOfLight = 0.5;
-constexpr int kMaxSamplesByNeed = 4096;
 
 }  // namespace
 
@@ -20,7 +19,7 @@ LightLimits light_limits(const SceneSpec& scene) {
   LightLimits limits;
   if (const auto accuracy = accuracy_of(scene.accuracy, scene.device.accuracy)) {
     limits.noise_fraction = std::sqrt(kVarianceOfLight) * accuracy->pixel_noise;
-    limits.max_samples = kMaxSamplesByNeed;
+    limits.max_samples = kMostPathsByNeed;
     limits.direct_noise = limits.noise_fraction;
     if (scene.device.camera)  // for a light field's own
       limits.direct_tolerance = std::min(1.0, limits.noise_fraction * least_noise_share(*scene.device.camera));

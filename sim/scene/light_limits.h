@@ -10,6 +10,9 @@ struct SceneSpec;
 
 /// At most so many paths a pixel where neither a scene's `light` nor an `accuracy` says otherwise.
 inline constexpr int kUsualMaxSamples = 64;
+/// The same where an accuracy says how exact light has to be. With 4096 a picture of `gelsight-dome` took more than
+/// twenty minutes, where direct light is nearer at a second: who wants so many says so in `light`.
+inline constexpr int kMostPathsByNeed = 256;
 
 /// How exact a scene's light is made: what its block `light` says, and what that leaves open.
 struct LightLimits {
@@ -26,7 +29,7 @@ struct LightLimits {
 
 /// What is left open follows `accuracy.pixel_noise` where the scene or its device states an accuracy: half of the
 /// variance that is allowed goes to how light is made, to the noise of paths, with as many paths as that takes (up to
-/// 4096), or to what direct light is off.
+/// kMostPathsByNeed), or to what direct light is off.
 LightLimits light_limits(const SceneSpec& scene);
 
 /// What direct light may be off, as "1.5 %" or "0.71 of the imager's noise".

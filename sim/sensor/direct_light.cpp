@@ -80,6 +80,13 @@ double lit_radius(const GelSpec& gel, const Eigen::AlignedBox3d& reach) {
   return far.maxCoeff();
 }
 
+/// What is allowed, and what paths would leave, of light that isn't within it; empty of light that is.
+std::string beside_the_limit(const LightLimits& limits, const render::DirectChoice& chosen) {
+  if (!chosen.paths_noise) return {};
+  return fmt::format("; allowed are {}, and {} paths a pixel would leave some {:.2g}", direct_limit_in_words(limits),
+                     limits.max_samples, *chosen.paths_noise);
+}
+
 std::string with_figures(const std::string& verdict, const render::DirectChoice& chosen) {
   std::string text =
       fmt::format("{}: {:.2f} +- {:.2f} % ", verdict, 100 * chosen.error.rms, 100 * chosen.error.rms_error);
@@ -128,6 +135,7 @@ struct AskedLight {
       const auto channels = render::channel_responses(imager(view.scene.device, view.plan.bands, true));
       settings.field_accuracy = render::light_field_settings(rest, reach, settings).accuracy;
       settings.tolerance = *limits.direct_noise;
+      settings.paths = limits.max_samples;
       settings.error.seen = [channels](const cv::Mat& light) { return in_units_of_noise(light, channels); };
     }
     settings.direct.seed = settings.error.seed = settings.rest.seed = view.scene.seed;
@@ -173,15 +181,18 @@ DirectLight::DirectLight(const SceneView& view, const render::Camera& camera, st
   if (chosen.error.pixels > 0) choice_.error = chosen.error;
   if (!chosen.renderer) {
     if (forced) fail_at(scene.where, "effects.direct_light: on, but {}", chosen.reason);
-    choice_.reason = choice_.error ? fmt::format("{}; allowed are {}", with_figures("paths", chosen),
-                                                 direct_limit_in_words(light_limits(scene)))
-                                   : fmt::format("paths: {}", chosen.reason);
+    const LightLimits limits = light_limits(scene);
+    choice_.reason = !choice_.error       ? fmt::format("paths: {}", chosen.reason)
+                     : chosen.paths_noise ? with_figures("paths", chosen) + beside_the_limit(limits, chosen)
+                                          : fmt::format("{}; allowed are {}", with_figures("paths", chosen),
+                                                        direct_limit_in_words(limits));
     return;
   }
   choice_.direct = true;
   const int rays = settings.direct.samples = chosen.samples;
   choice_.reason =
-      with_figures(rays == 1 ? "direct light" : fmt::format("direct light of {} rays a pixel", rays), chosen);
+      with_figures(rays == 1 ? "direct light" : fmt::format("direct light of {} rays a pixel", rays), chosen) +
+      beside_the_limit(light_limits(scene), chosen);
   settings_ = settings.direct;
   rest_ = asked.rest;
   rest_.interreflection = false;

@@ -10,7 +10,7 @@
 namespace touchstone::sim {
 
 /// Raised with each change of the file's layout, or of how light is found.
-inline constexpr int kLightFormat = 4;
+inline constexpr int kLightFormat = 5;
 
 /// `light-<key>.bin`. @pre `key` is a SHA-256 in hexadecimal digits
 std::filesystem::path light_file(const std::filesystem::path& folder, const std::string& key);

@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
@@ -8,6 +9,7 @@
 #include "core/error.h"
 #include "render/cameras/first_hits.h"
 #include "render/direct/direct_error.h"
+#include "render/paths/trace_twice.h"
 #include "tests/render/paths/light_scenes.h"
 
 namespace touchstone::render {
@@ -261,6 +263,35 @@ TEST(DirectChoice, TakesMorePathsWhereItCannotTell) {
   EXPECT_EQ(unsure.error.rms, finer.error.rms);
   EXPECT_EQ(unsure.error.rms_error, finer.error.rms_error);
   EXPECT_NE(sure.error.rms_error, finer.error.rms_error);
+}
+
+TEST(DirectChoice, WhereNothingIsGoodEnoughTakesWhatIsNearest) {
+  const Scene rest = membrane(0.0, true);
+  const Scene first = membrane(0.3, true);
+  DirectChoiceSettings settings;
+  settings.tolerance = 1e-3;
+  settings.field_accuracy = 1e-2;
+  settings.error = some(100, 4);
+  const auto choice = [&](int paths) {
+    settings.paths = paths;
+    return choose_direct(rest, first, camera(), reach(), settings);
+  };
+  const DirectChoice few = choice(4);
+  ASSERT_NE(few.renderer, nullptr) << few.reason;
+  EXPECT_GT(few.error.rms, settings.tolerance);
+  EXPECT_GT(few.paths_noise.value(), few.error.rms);
+  EXPECT_GT(few.samples, 0);
+  EXPECT_GT(cv::sum(few.renderer->render(first).irradiance)[0], 0.0);
+  const DirectChoice many = choice(1 << 28);
+  EXPECT_EQ(many.renderer, nullptr);
+  EXPECT_THAT(many.reason, ::testing::HasSubstr("asked for"));
+  EXPECT_LT(many.paths_noise.value(), 1e-3 * few.paths_noise.value());
+  // Of a picture of so many paths, the difference from a close one.
+  const cv::Mat all(30, 40, CV_8UC1, cv::Scalar(255));
+  const auto fine = trace_twice(first, camera(), all, 4096, 16, 11);
+  const auto coarse = trace_twice(first, camera(), all, 4, 16, 12);
+  EXPECT_NEAR(few.paths_noise.value(), direct_error_beside(fine, coarse[0], all).rms, 0.15 * few.paths_noise.value());
+  EXPECT_EQ(choice(0).renderer, nullptr);
 }
 
 TEST(DirectChoice, SaysWhyNot) {

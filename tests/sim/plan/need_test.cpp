@@ -124,7 +124,7 @@ TEST(Need, PathsFollowTheAccuracyUnlessTheSceneStatesThem) {
   SceneSpec scene = wanted("ball-press.yaml", {.pixel_noise = 0.5});
   const LightLimits exact = light_limits(scene);
   EXPECT_DOUBLE_EQ(exact.noise_fraction, 0.5 * std::sqrt(0.5));
-  EXPECT_EQ(exact.max_samples, 4096);
+  EXPECT_EQ(exact.max_samples, 256);
   EXPECT_LT(exact.direct_tolerance, 0.015);
   EXPECT_DOUBLE_EQ(exact.direct_noise.value(), exact.noise_fraction);
   EXPECT_FALSE(usual.direct_noise);
@@ -132,7 +132,7 @@ TEST(Need, PathsFollowTheAccuracyUnlessTheSceneStatesThem) {
                    2.0 * exact.direct_tolerance);
   EXPECT_THAT(
       effect(make_plan(scene, {}), "noise of paths").why,
-      AllOf(HasSubstr("32 to 4096 paths"), HasSubstr("0.35 of the imager's noise"), HasSubstr("0.5 of the noise")));
+      AllOf(HasSubstr("32 to 256 paths"), HasSubstr("0.35 of the imager's noise"), HasSubstr("0.5 of the noise")));
   scene.light.max_samples = 16;
   scene.light.noise_fraction = 2.0;
   scene.light.direct_tolerance = 0.2;
@@ -152,6 +152,22 @@ TEST(Need, AMeshThatCantMeetTheAccuracyIsNamedWithTheLeastThereIs) {
                                           HasSubstr("edges of 0.5 mm")));
   EXPECT_TRUE(make_plan(scene, {{kFinerMesh, Change{.force_percent = 0.5}, ""}}).warnings.empty());
   EXPECT_TRUE(make_plan(shipped("ball-press.yaml"), {{kFinerMesh, Change{.force_percent = 1.7}, ""}}).warnings.empty());
+}
+
+TEST(Need, PathsThatCantMeetTheAccuracyAreNamedWithTheLeastThereIs) {
+  SceneSpec scene = wanted("ball-press.yaml");
+  scene.effects.shared_paths = Switch::off;
+  const SceneNeeds needs = {{kMorePaths, Change{.pixel_noise = 2.0 * std::sqrt(0.5)}, ""}};
+  const Plan plan = make_plan(scene, needs);
+  ASSERT_FALSE(plan.warnings.empty());
+  EXPECT_THAT(plan.warnings.back(), AllOf(HasSubstr("accuracy.pixel_noise is 1"), HasSubstr("leave some 1.4"),
+                                          HasSubstr("light.max_samples of 256"), HasSubstr("some 1100")));
+  EXPECT_TRUE(make_plan(scene, {{kMorePaths, Change{.pixel_noise = 0.9}, ""}}).warnings.empty());
+  scene.light.noise_fraction = 2.0;
+  EXPECT_THAT(make_plan(scene, {{kMorePaths, Change{.pixel_noise = 2.0}, ""}}).warnings.back(),
+              HasSubstr("light.noise_fraction of 2 leaves more"));
+  scene.effects.shared_paths = Switch::automatic;
+  EXPECT_TRUE(make_plan(scene, needs).warnings.empty()) << "pixels that share paths have more of them";
 }
 
 TEST(Need, ClosedFormsAreHeldBesideTheAccuracy) {

@@ -231,6 +231,16 @@ TEST(DirectLight, SwitchedOffOrTooFarOffThePathTracersBytesStay) {
   EXPECT_TRUE(same_bytes(one.frame, other.frame));
 }
 
+TEST(DirectLight, WhereTheAccuracyCantBeHadWhatIsNearestIsTakenAndSaysSo) {
+  const std::string strict = "accuracy: {pixel_noise: 0.01}\n";
+  SceneSpec scene = scene_of(kMatt, strict + "light: {max_samples: 16}\n");
+  scene.device.camera->exposure_us = 0.03;  // below its full well
+  const Seen seen = see(scene);
+  ASSERT_TRUE(seen.camera->light_choice().direct) << seen.camera->light_choice().reason;
+  EXPECT_THAT(seen.camera->light_choice().reason,
+              AllOf(HasSubstr("allowed are 0.0071 of the imager's noise"), HasSubstr("16 paths a pixel would leave")));
+}
+
 TEST(DirectLight, AnExposureIsTheMeanOfItsMoments) {
   SceneSpec scene = scene_of(kMatt, "effects: {motion_blur: on}\n");
   scene.device.camera->exposure_us = 20000.0;
