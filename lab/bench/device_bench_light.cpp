@@ -23,6 +23,7 @@ constexpr double kReferenceShare =
     0.35;  // of the wanted pixel error: the least error that is to be distinguished from zero
 constexpr double kNoisiestReference = 4.0;    // of the imager's noise
 constexpr double kMostReferenceSeconds = 20;  // for the pictures of one scene; there are some twenty
+constexpr double kWithFewReferences = 4.0;    // times as many seconds where one reference is all there is
 constexpr int kPilotPaths = 8;
 constexpr double kLeastUnsaturated = 0.5;  // of a picture's pixels: those below their full well
 constexpr double kEnough = 0.7;  // of the wanted error: what is better costs a multiple, and nobody asked for it
@@ -298,6 +299,26 @@ TruePictures true_pictures(const BenchParts& parts, const sim::DeviceSpec& devic
   return render_truth(reference_scene(parts, device, spec, seed), gel, spec);
 }
 
+namespace {
+
+/// What pictures are compared, for people.
+std::string pictures_in_words(const BenchParts& parts, const std::string& saturated) {
+  const sim::CameraSpec& camera = *parts.device.camera;
+  const sim::CameraSpec& whole = *parts.whole_device.camera;
+  std::string words = fmt::format("{} x {} pixels", camera.width, camera.height);
+  if (camera.width != whole.width || camera.height != whole.height) {
+    words += fmt::format(" out of the middle of {} x {}", whole.width, whole.height);
+  }
+  return words +
+         fmt::format(
+             ", of a pressed and a dragged state; {} paths a pixel for the reference{}, so that errors under {:.2g} "
+             "can't be distinguished from zero",
+             parts.reference_paths, parts.exact_words, parts.least_pixel_error) +
+         saturated;
+}
+
+}  // namespace
+
 std::string prepare_pictures(BenchParts& parts) {
   if (!parts.device.camera) return "none: the device has no camera";
   const sim::PressSpec& spec = parts.presses.specs.front();
@@ -324,27 +345,21 @@ std::string prepare_pictures(BenchParts& parts) {
     const double least = kReferenceShare * parts.settings.pixel_error;
     const double wanted = std::pow(noise / std::min(kNoisiestReference, least / left), 2);
     const double seconds = static_cast<double>(pictures_of(pilot.runs[0])) * pilot.runs[0].picture_seconds;
-    const double afforded = kMostReferenceSeconds / seconds;
+    const bool once = parts.settings.planned_alone;
+    const double afforded = (once ? kWithFewReferences : 1.0) * kMostReferenceSeconds / seconds;
     const double times = std::clamp(std::min(wanted, afforded), 1.0, static_cast<double>(kPlenty) / kPilotPaths);
     parts.reference_paths = static_cast<int>(std::ceil(kPilotPaths * times));
     parts.least_pixel_error = std::max(least, noise * left / std::sqrt(times));
+    if (once) {  // planned_bench has presses of its own
+      parts.truth = pilot;
+      return pictures_in_words(parts, saturated);
+    }
     parts.truth = true_pictures(parts, parts.finest_device, parts.finest_gel, spec, parts.settings.seed);
     parts.own_truth = true_pictures(parts, parts.device, parts.own_gel, spec, parts.settings.seed + 30);
   } catch (const Error& error) {
     return fmt::format("none: {}", error.what());
   }
-  const sim::CameraSpec& camera = *parts.device.camera;
-  const sim::CameraSpec& whole = *parts.whole_device.camera;
-  std::string words = fmt::format("{} x {} pixels", camera.width, camera.height);
-  if (camera.width != whole.width || camera.height != whole.height) {
-    words += fmt::format(" out of the middle of {} x {}", whole.width, whole.height);
-  }
-  return words +
-         fmt::format(
-             ", of a pressed and a dragged state; {} paths a pixel for the reference{}, so that errors under {:.2g} "
-             "can't be distinguished from zero",
-             parts.reference_paths, parts.exact_words, parts.least_pixel_error) +
-         saturated;
+  return pictures_in_words(parts, saturated);
 }
 
 double mesh_pixel_error(const BenchParts& parts, const sim::DeviceSpec& device, const fem::Compliance& gel) {
