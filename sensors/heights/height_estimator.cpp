@@ -141,7 +141,9 @@ const HeightModel& checked(const HeightModel& model) {
 HeightEstimator::HeightEstimator(const HeightModel& model, const HeightSettings& settings)
     : model_(checked(model)),
       settings_(settings),
-      poisson_(model.background.mean.cols, model.background.mean.rows, settings.border) {
+      poisson_(model.background.mean.cols, model.background.mean.rows, settings.border),
+      follower_(model.background.mean.size(), model.mm_per_px, settings.follow) {
+  model_.background.mean = model.background.mean.clone();  // which may be moved
   const cv::Mat& mean = model_.background.mean;
   if (model_.white_balance) gains_.emplace(model_.background);
   if (model_.network) reader_.emplace(*model_.network, mean.size(), model_.mm_per_px);
@@ -149,15 +151,7 @@ HeightEstimator::HeightEstimator(const HeightModel& model, const HeightSettings&
   const int height = mean.rows;
   const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   rest_.resize(3 * pixels);
-  for (int v = 0; v < height; ++v) {
-    for (int u = 0; u < width; ++u) {
-      const auto& pixel = mean.at<cv::Vec3f>(v, u);
-      for (std::size_t c = 0; c < 3; ++c) {
-        rest_[c * pixels + static_cast<std::size_t>(v * width + u)] =
-            static_cast<std::int16_t>(std::lround(pixel[static_cast<int>(c)] * (1 << kColourBits)));
-      }
-    }
-  }
+  take_background();
   const ColourCorrection correction = correction_of(model_);
   const int bands = (height + kBandRows - 1) / kBandRows;
   matrix_.resize(static_cast<std::size_t>(bands) * 9 * static_cast<std::size_t>(width));
@@ -182,6 +176,30 @@ HeightEstimator::HeightEstimator(const HeightModel& model, const HeightSettings&
   result_.slope_v.create(height, width, CV_32FC1);
   result_.height_mm.create(height, width, CV_32FC1);
   result_.contact.create(height, width, CV_8UC1);
+}
+
+void HeightEstimator::take_background() {
+  const cv::Mat& mean = model_.background.mean;
+  const std::size_t pixels = mean.total();
+  for (int v = 0; v < mean.rows; ++v) {
+    const auto* const row = mean.ptr<float>(v);
+    for (std::size_t c = 0; c < 3; ++c) {
+      std::int16_t* const rest = rest_.data() + c * pixels + static_cast<std::size_t>(v) * mean.cols;
+      for (int u = 0; u < mean.cols; ++u) {
+        rest[u] = static_cast<std::int16_t>(std::lround(row[3 * u + static_cast<int>(c)] * (1 << kColourBits)));
+      }
+    }
+  }
+}
+
+void HeightEstimator::set_rest(std::span<const cv::Mat> frames) {
+  for (const cv::Mat& frame : frames) {
+    const std::string fault = frame_fault(frame, model_.background.mean.size());
+    if (!fault.empty()) fail("the frame {}", fault);
+  }
+  model_.background = mean_background(frames);
+  take_background();
+  if (gains_) gains_.emplace(model_.background);
 }
 
 void HeightEstimator::look_up_slopes(const cv::Mat& frame) {
@@ -247,6 +265,12 @@ const HeightResult& HeightEstimator::estimate(const cv::Mat& frame) {
   result_.dark = result_.dark_share > settings_.most_dark;
   result_.flat = is_flat(frame);
   result_.contact_at_border = touches_border(result_.contact);
+  result_.rest_share = follower_.look(frame, result_.gain, model_.background.mean);
+  result_.unlike = result_.rest_share < settings_.least_rest;
+  if (settings_.follow.frames > 0.0 && result_.trusted()) {
+    follower_.follow(frame, result_.gain, result_.contact, model_.background.mean);
+    take_background();
+  }
   return result_;
 }
 

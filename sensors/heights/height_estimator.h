@@ -4,11 +4,13 @@
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "sensors/heights/frame_gain.h"
 #include "sensors/heights/height_map.h"
 #include "sensors/heights/height_model.h"
+#include "sensors/heights/rest_follower.h"
 #include "sensors/heights/slope_network.h"
 #include "sensors/numerics/poisson_solver.h"
 
@@ -18,8 +20,10 @@ namespace touchstone::sensors {
 struct HeightSettings {
   HeightBorder border = HeightBorder::zero;
   ContactRule contact{};
-  double most_lost = 0.02;  ///< share of pixels with two channels at 255 from which a frame is flagged
-  double most_dark = 0.5;   ///< share of black pixels, likewise
+  double most_lost = 0.02;   ///< share of pixels with two channels at 255 from which a frame is flagged
+  double most_dark = 0.5;    ///< share of black pixels, likewise
+  double least_rest = 0.05;  ///< share of the picture that shows the gel at rest, below which a frame is flagged
+  FollowSettings follow{};   ///< how the background is followed as it drifts: not, unless `frames` says so
 };
 
 /// Why a pixel's slope is to be doubted: bits of HeightEstimator::doubts.
@@ -36,16 +40,20 @@ struct HeightResult {
   cv::Mat slope_u, slope_v;  ///< CV_32FC1, as looked up
   cv::Mat contact;           ///< CV_8UC1: 255 where ContactRule says contact
   int contact_pixels = 0;
-  cv::Vec3d gain{1.0, 1.0, 1.0};   ///< of the frame's channels, BGR, which was taken out; 1 without white balance
-  double saturated_share = 0.0;    ///< of the pixels: a channel is at 255
-  double lost_share = 0.0;         ///< of the pixels: two or three channels are
-  double dark_share = 0.0;         ///< all channels are 0
-  bool overexposed = false;        ///< more lost pixels than the settings allow: heights there are too flat
-  bool dark = false;               ///< more black pixels than the settings allow: no light, or a covered camera
-  bool flat = false;               ///< all pixels are alike: no camera that sees a gel delivers that
+  cv::Vec3d gain{1.0, 1.0, 1.0};  ///< of the frame's channels, BGR, which was taken out; 1 without white balance
+  double saturated_share = 0.0;   ///< of the pixels: a channel is at 255
+  double lost_share = 0.0;        ///< of the pixels: two or three channels are
+  double dark_share = 0.0;        ///< all channels are 0
+  double rest_share = 0.0;        ///< of the picture: as the gel at rest (FollowSettings::still_DN)
+  bool overexposed = false;       ///< more lost pixels than the settings allow: heights there are too flat
+  bool dark = false;              ///< more black pixels than the settings allow: no light, or a covered camera
+  bool flat = false;              ///< all pixels are alike: no camera that sees a gel delivers that
+  /// Less of the picture is at rest than the settings ask for: the light has changed, it's another unit's background,
+  /// or the contact is all over. Nothing then tells height from light.
+  bool unlike = false;
   bool contact_at_border = false;  ///< the contact runs out of the picture: use HeightBorder::free, and mind the level
 
-  bool trusted() const { return !overexposed && !dark && !flat; }
+  bool trusted() const { return !overexposed && !dark && !flat && !unlike; }
 };
 
 /// How well the calibration's colours cover those of a frame.
@@ -55,8 +63,9 @@ struct FrameCoverage {
   double steep_share = 0.0;             ///< of the pixels: steeper than 99 % of the calibration's, so extrapolated
 };
 
-/// Made once for a model; then every frame costs the same and, read by the table, allocates nothing. Not for two
-/// threads at once. Colours and slopes are looked up at places that are corrected in bands of four rows.
+/// Made once for a model; then every frame costs the same and, read by the table, allocates nothing. Where the
+/// background is followed, a frame's heights depend on the frames before it; else on itself alone. Not for two threads
+/// at once. Colours and slopes are looked up at places that are corrected in bands of four rows.
 class HeightEstimator {
  public:
   /// @throws Error if the model is faulty
@@ -64,6 +73,10 @@ class HeightEstimator {
 
   /// @throws Error if the frame isn't a colour picture of the model's size
   const HeightResult& estimate(const cv::Mat& frame);
+
+  /// Takes frames of the gel at rest for its background from now on, as after a scratch, or a night.
+  /// @throws Error as mean_background, or if they aren't of the model's size
+  void set_rest(std::span<const cv::Mat> frames);
 
   /// @throws Error as estimate
   FrameCoverage coverage(const cv::Mat& frame);
@@ -73,6 +86,7 @@ class HeightEstimator {
 
  private:
   void find_slopes(const cv::Mat& frame);  ///< fills the result's slopes, gain and shares
+  void take_background();                  ///< the model's, to look up from
   void look_up_slopes(const cv::Mat& frame);
   void count_shares(const cv::Mat& frame);
 
@@ -81,6 +95,7 @@ class HeightEstimator {
   PoissonSolver poisson_;
   std::optional<GainFinder> gains_;  ///< with white balance
   std::optional<SlopeReader> reader_;
+  RestFollower follower_;
   HeightResult result_;
   cv::Mat planes_[3];
   std::vector<std::int16_t> rest_;    ///< 3 planes: the background in 128ths
