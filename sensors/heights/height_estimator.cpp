@@ -142,7 +142,7 @@ HeightEstimator::HeightEstimator(const HeightModel& model, const HeightSettings&
     : model_(checked(model)),
       settings_(settings),
       poisson_(model.background.mean.cols, model.background.mean.rows, settings.border),
-      follower_(model.background.mean.size(), model.mm_per_px, settings.follow) {
+      follower_(model.background.mean, model.mm_per_px, settings.follow) {
   model_.background.mean = model.background.mean.clone();  // which may be moved
   const cv::Mat& mean = model_.background.mean;
   if (model_.white_balance) gains_.emplace(model_.background);
@@ -199,6 +199,7 @@ void HeightEstimator::set_rest(std::span<const cv::Mat> frames) {
   }
   model_.background = mean_background(frames);
   take_background();
+  follower_.take(model_.background.mean);
   if (gains_) gains_.emplace(model_.background);
 }
 
@@ -265,11 +266,12 @@ const HeightResult& HeightEstimator::estimate(const cv::Mat& frame) {
   result_.dark = result_.dark_share > settings_.most_dark;
   result_.flat = is_flat(frame);
   result_.contact_at_border = touches_border(result_.contact);
-  result_.rest_share = follower_.look(frame, result_.gain, model_.background.mean);
+  result_.rest_share = follower_.look(planes_, result_.gain);
   result_.unlike = result_.rest_share < settings_.least_rest;
   if (settings_.follow.frames > 0.0 && result_.trusted()) {
     follower_.follow(frame, result_.gain, result_.contact, model_.background.mean);
     take_background();
+    follower_.take(model_.background.mean);
   }
   return result_;
 }

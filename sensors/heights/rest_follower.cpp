@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
+#include "core/wide_clones.h"
 
 namespace touchstone::sensors {
 namespace {
@@ -18,10 +19,22 @@ cv::Rect pixels_of(int column, int row, const cv::Size& size) {
   return whole & cv::Rect({0, 0}, size);
 }
 
+/// Adds a row of pixels to the sums of its blocks.
+TS_WIDE_CLONES void add_blocks(const unsigned char* row, int count, int* sums) {
+  const int whole = count / kSide;
+  for (int k = 0; k < whole; ++k) {
+    int sum = 0;
+    for (int i = 0; i < kSide; ++i) sum += row[kSide * k + i];
+    sums[k] += sum;
+  }
+  for (int u = kSide * whole; u < count; ++u) sums[whole] += row[u];
+}
+
 }  // namespace
 
-RestFollower::RestFollower(const cv::Size& size, double mm_per_px, const FollowSettings& settings)
+RestFollower::RestFollower(const cv::Mat& mean, double mm_per_px, const FollowSettings& settings)
     : settings_(settings) {
+  const cv::Size size = mean.size();
   const auto check = [](const char* name, double value) {
     if (!(value >= 0.0) || std::isinf(value))
       fail("rest follower: {} is {}; allowed are numbers from 0 on", name, value);
@@ -37,25 +50,35 @@ RestFollower::RestFollower(const cv::Size& size, double mm_per_px, const FollowS
   moved_.create(blocks, CV_8UC1);
   slopes_.create(blocks, CV_8UC1);
   near_.create(blocks, CV_8UC1);
+  rest_.resize(moved_.total());
+  sums_.resize(static_cast<std::size_t>(blocks.width));
+  take(mean);
 }
 
-double RestFollower::look(const cv::Mat& frame, const cv::Vec3d& gain, const cv::Mat& mean) {
-  const float share[] = {static_cast<float>(1.0 / gain[0]), static_cast<float>(1.0 / gain[1]),
-                         static_cast<float>(1.0 / gain[2])};
+void RestFollower::take(const cv::Mat& mean) {
+  std::fill(rest_.begin(), rest_.end(), cv::Vec3f());
+  for (int v = 0; v < mean.rows; ++v) {
+    const auto* const row = mean.ptr<cv::Vec3f>(v);
+    cv::Vec3f* const blocks = &rest_[static_cast<std::size_t>(v / kSide * moved_.cols)];
+    for (int u = 0; u < mean.cols; ++u) blocks[u / kSide] += row[u];
+  }
+}
+
+double RestFollower::look(const cv::Mat (&planes)[3], const cv::Vec3d& gain) {
+  moved_.setTo(0);
   for (int row = 0; row < moved_.rows; ++row) {
-    for (int column = 0; column < moved_.cols; ++column) {
-      const cv::Rect here = pixels_of(column, row, frame.size());
-      float sums[3] = {0.0F, 0.0F, 0.0F};
-      for (int v = here.y; v < here.y + here.height; ++v) {
-        const unsigned char* const seen = frame.ptr(v) + 3 * here.x;
-        const float* const rest = mean.ptr<float>(v) + 3 * here.x;
-        for (int i = 0; i < 3 * here.width; i += 3) {
-          for (int c = 0; c < 3; ++c) sums[c] += static_cast<float>(seen[i + c]) * share[c] - rest[i + c];
-        }
+    for (int c = 0; c < 3; ++c) {
+      const cv::Mat& plane = planes[c];
+      std::fill(sums_.begin(), sums_.end(), 0);
+      const int below = std::min(kSide * (row + 1), plane.rows);
+      for (int v = kSide * row; v < below; ++v) add_blocks(plane.ptr(v), plane.cols, sums_.data());
+      const auto share = static_cast<float>(1.0 / gain[c]);
+      const cv::Vec3f* const rest = &rest_[static_cast<std::size_t>(row * moved_.cols)];
+      for (int column = 0; column < moved_.cols; ++column) {
+        const auto area = static_cast<float>(pixels_of(column, row, plane.size()).area());
+        const float off = static_cast<float>(sums_[static_cast<std::size_t>(column)]) * share - rest[column][c];
+        if (std::abs(off) > settings_.still_DN * area) moved_.at<unsigned char>(row, column) = 255;
       }
-      const float most =
-          std::max({std::abs(sums[0]), std::abs(sums[1]), std::abs(sums[2])}) / static_cast<float>(here.area());
-      moved_.at<unsigned char>(row, column) = most > settings_.still_DN ? 255 : 0;
     }
   }
   return 1.0 - static_cast<double>(cv::countNonZero(moved_)) / static_cast<double>(moved_.total());

@@ -21,24 +21,30 @@ struct FollowSettings {
 /// Looks at blocks of 8 x 8 pixels. Made once for a picture; then it allocates nothing. Not for two threads at once.
 class RestFollower {
  public:
+  /// `mean` is the background's, CV_32FC3.
   /// @throws Error if a setting is negative or not a number @pre the scale is above 0
-  RestFollower(const cv::Size& size, double mm_per_px, const FollowSettings& settings);
+  RestFollower(const cv::Mat& mean, double mm_per_px, const FollowSettings& settings);
+
+  /// Another background. @pre of the same size
+  void take(const cv::Mat& mean);
 
   /// The share of the blocks that are at rest. `gain`: what the frame's channels are stronger by (frame_gain.h).
-  /// @pre frame is CV_8UC3 and mean CV_32FC3, both of the size
-  double look(const cv::Mat& frame, const cv::Vec3d& gain, const cv::Mat& mean);
+  /// @pre the planes are the frame's channels, CV_8UC1 of the mean's size
+  double look(const cv::Mat (&planes)[3], const cv::Vec3d& gain);
 
   /// Moves the mean towards the frame that was looked at last where nothing touches, nor anything but a speck isn't at
   /// rest, within reach.
-  /// @pre as look; contact is CV_8UC1 of the size, 0 where nothing touches
+  /// @pre frame is CV_8UC3, mean the one that was taken last; contact is CV_8UC1, 0 where nothing touches
   void follow(const cv::Mat& frame, const cv::Vec3d& gain, const cv::Mat& contact, cv::Mat& mean);
 
  private:
   FollowSettings settings_;
-  cv::Mat moved_;   ///< a pixel a block, CV_8UC1: 255 where it isn't at rest
-  cv::Mat slopes_;  ///< the same without specks, and with what is in contact
-  cv::Mat near_;    ///< and with what is within reach
-  cv::Mat disc_;    ///< of that radius
+  std::vector<cv::Vec3f> rest_;  ///< the mean's sums over the blocks, row by row
+  std::vector<int> sums_;        ///< of one row of blocks and channel of a frame
+  cv::Mat moved_;                ///< a pixel a block, CV_8UC1: 255 where it isn't at rest
+  cv::Mat slopes_;               ///< the same without specks, and with what is in contact
+  cv::Mat near_;                 ///< and with what is within reach
+  cv::Mat disc_;                 ///< of that radius
 };
 
 }  // namespace touchstone::sensors
