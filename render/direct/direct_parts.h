@@ -60,7 +60,7 @@ struct DirectRenderer::Parts {
   bool stands_still(const Scene& scene) const;
 
   /// Casts the rays and shades what they meet: into `radiance`, or into the picture where nothing is spread.
-  void cast(const DirectFrame& frame, DirectImage& image);
+  void cast(const DirectFrame& frame, const SamplePart& part, DirectImage& image);
   /// Casts more rays where `radiance` has edges.
   void refine(const DirectFrame& frame, DirectImage& image);
   /// The bounced light at what a lane has met, null where there's none; kept in `memory`.

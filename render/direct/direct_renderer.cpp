@@ -50,7 +50,7 @@ void count_up(const std::vector<DirectCounts>& task_counts, DirectImage& image) 
 
 }  // namespace
 
-void DirectRenderer::Parts::cast(const DirectFrame& frame, DirectImage& image) {
+void DirectRenderer::Parts::cast(const DirectFrame& frame, const SamplePart& part, DirectImage& image) {
   const int bands = rays.bands;
   const int samples = settings.samples;
   const int columns = rays.grid.columns;
@@ -62,7 +62,7 @@ void DirectRenderer::Parts::cast(const DirectFrame& frame, DirectImage& image) {
     return ones;
   }();
   const auto counted = for_batches(rays, frame, [&](DirectBatch& batch, int first, int packets, DirectCounts& counts) {
-    for (int sample = 0; sample < samples; ++sample) {
+    for (int sample = part.first; sample < samples; sample += part.step) {
       const std::size_t number = static_cast<std::size_t>(sample) * rays.tiles + first;
       batch.intersect({rays.packets.data() + number, static_cast<std::size_t>(packets)}, counts);
       const auto for_lanes = [&](const auto& work) { for_lanes_on_grid(rays, first, packets, work); };
@@ -379,12 +379,16 @@ void DirectRenderer::set_bounced_light(const cv::Mat& irradiance, const Scene& r
   parts.rest_normals = std::move(normals);
 }
 
-DirectImage DirectRenderer::render(const Scene& scene) {
+DirectImage DirectRenderer::render(const Scene& scene, const SamplePart& part) {
   Parts& parts = *parts_;
+  const int samples = parts.settings.samples;
+  TS_ASSERT(part.step >= 1 && part.first >= 0 && part.first < samples);
   const auto prepared = parts.prepare(scene);
   DirectImage image;
   image.irradiance = cv::Mat::zeros(parts.height(), parts.width(), CV_32FC(parts.rays.bands));
-  parts.cast(*prepared->frame, image);
+  parts.cast(*prepared->frame, part, image);
+  const int drawn = (samples - part.first + part.step - 1) / part.step;
+  if (drawn < samples) image.irradiance *= static_cast<double>(samples) / drawn;  // each ray brings its share of all
   image.sheet_triangle = parts.triangles_by_pixel();
   if (parts.spreads) {
     if (parts.refines) parts.refine(*prepared->frame, image);

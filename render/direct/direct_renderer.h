@@ -34,6 +34,13 @@ struct DirectSettings {
   double edge_contrast = 0.1;
 };
 
+/// Which of DirectSettings::samples are drawn: each `step`-th from `first` on. Pictures of a moving scene at `step`
+/// moments, each with another part, have on the mean as many rays as one picture with all.
+struct SamplePart {
+  int first = 0;
+  int step = 1;
+};
+
 /// `irradiance`: CV_32FC(bands), W/m^2 on the sensor, as RenderedImage::irradiance.
 struct DirectImage {
   cv::Mat irradiance;
@@ -70,7 +77,8 @@ class DirectRenderer {
   /// lamps or surroundings than the field; has materials other than Lambertian, RoughConductor, Black and Emitter, or
   /// scattering media; films other than `rest`'s or than film_screen.h takes; or things outside of the field's layer,
   /// or lit ones outside of its box
-  DirectImage render(const Scene& scene);
+  /// @pre the part has a sample
+  DirectImage render(const Scene& scene, const SamplePart& part = {});
 
   /// What the first surface of a scene shows ray by ray, to be moved by SheetBetween; nothing where that can't be had:
   /// with several samples a pixel, without blur, of a sheet that isn't Lambertian or has no print (of no marks, at

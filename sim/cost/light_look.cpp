@@ -127,8 +127,9 @@ class Look {
         found.set_up_s += paths_s;
       }
       if (!light.choice().direct) return false;
-      const double drawn_s =
-          mean_over_moments([&](const render::Scene& scene) { light.render(quick ? scene : without_bounces(scene)); });
+      const double drawn_s = mean_over_moments([&](const render::Scene& scene) {
+        light.render(quick ? scene : without_bounces(scene), light.part_of(0, moments_ - 1.0));
+      });
       found.moment_s = seen_s_ + drawn_s;
       found.how = light.choice().reason;
       holds_ = true;

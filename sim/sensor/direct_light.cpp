@@ -262,11 +262,16 @@ auto DirectLight::with_renderer(const Work& work) const {
   });
 }
 
-std::optional<render::DirectImage> DirectLight::render(render::Scene scene) const {
+std::optional<render::DirectImage> DirectLight::render(render::Scene scene, const render::SamplePart& part) const {
   TS_ASSERT(choice_.direct);
   const render::Scene direct = for_direct_light(std::move(scene));
   if (!is_within_reach(direct)) return std::nullopt;
-  return with_renderer([&](render::DirectRenderer& renderer) { return renderer.render(direct); });
+  return with_renderer([&](render::DirectRenderer& renderer) { return renderer.render(direct, part); });
+}
+
+render::SamplePart DirectLight::part_of(std::size_t moment, double together) const {
+  const int step = std::clamp(static_cast<int>(together), 1, settings_.samples);
+  return {static_cast<int>(moment % static_cast<std::size_t>(step)), step};
 }
 
 std::optional<render::SheetPoints> DirectLight::points(const render::Scene& scene) const {

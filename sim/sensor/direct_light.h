@@ -69,7 +69,10 @@ class DirectLight {
 
   /// The picture of a scene as SceneView::seen gives it; nothing if the gel has gone where the light field doesn't
   /// reach. @pre choice().direct
-  std::optional<render::DirectImage> render(render::Scene scene) const;
+  std::optional<render::DirectImage> render(render::Scene scene, const render::SamplePart& part = {}) const;
+  /// The part of its rays a pixel that one of several moments takes whose mean is wanted, `together` of which a pixel
+  /// sees (render::SamplePart).
+  render::SamplePart part_of(std::size_t moment, double together) const;
 
   /// Have its pictures points that can be moved (DirectRenderer::sheet_points)? Those of one ray a pixel have.
   bool has_points() const { return choice_.direct && settings_.samples == 1; }

@@ -284,7 +284,7 @@ struct VirtualCamera::Parts : SceneView {
       const bool later = times[i] > 0.0;
       const fem::PressState press = later ? state_after(truth, times[i]) : truth.press;
       const std::optional<fem::ReliefAnswer> contact = later ? relief(press) : now;
-      const auto image = direct->render(seen(press, contact));
+      const auto image = direct->render(seen(press, contact), direct->part_of(i, intervals_of_row(times)));
       if (!image) return std::nullopt;
       counts.paths += image->primary;
       counts.primary += image->primary;
@@ -296,6 +296,12 @@ struct VirtualCamera::Parts : SceneView {
         develop(irradiance, {}, truth, now, counts, static_cast<std::int64_t>(times.size()) * size.area());
     capture.direct = true;
     return capture;
+  }
+
+  /// How many steps between moments a row's exposure lasts.
+  double intervals_of_row(const std::vector<double>& times) const {
+    if (times.size() < 2) return 1.0;
+    return std::max(1.0, shutter_timing().exposure_s / times.back() * static_cast<double>(times.size() - 1));
   }
 
   render::ShutterTiming shutter_timing() const {
@@ -326,9 +332,7 @@ struct VirtualCamera::Parts : SceneView {
     }
     const render::ShutterTiming timing = shutter_timing();
     render::RenderSettings of_moment = settings;
-    const double intervals_of_row = timing.exposure_s / times.back() * static_cast<double>(times.size() - 1);
-    of_moment.noise =
-        noise_target(response, light_limits(scene).noise_fraction * std::sqrt(std::max(1.0, intervals_of_row)));
+    of_moment.noise = noise_target(response, light_limits(scene).noise_fraction * std::sqrt(intervals_of_row(times)));
     render::RollingExposure sum(times, timing, size, plan.bands.count());
     render::RayCounts counts;
     for (std::size_t i = 0; i < times.size(); ++i) {

@@ -30,6 +30,28 @@ TEST(DirectRenderer, SpreadingCentralRaysIsTheHolesOwnBlur) {
   EXPECT_NEAR(cv::mean(spread)[0] / cv::mean(whole)[0], 1.0, 2e-3);
 }
 
+// Parts of unequal size, 4, 3, 3, 3 and 3 of 16 rays: weighted so they are all the rays' picture.
+TEST(DirectRenderer, ThePartsOfItsRaysMakeTheWhole) {
+  const Scene scene = dented_scene(1.0, Lambertian{grey(0.7)});
+  const LightField field = make_light_field(scene, reach_of_membrane(), accuracy(1e-3));
+  DirectSettings settings;
+  settings.samples = 16;
+  DirectRenderer renderer(field, small_camera(48, 36), scene, settings);
+  const DirectImage whole = renderer.render(scene);
+  cv::Mat sum = cv::Mat::zeros(whole.irradiance.size(), whole.irradiance.type());
+  std::uint64_t rays = 0;
+  for (int first = 0; first < 5; ++first) {
+    const DirectImage part = renderer.render(scene, {first, 5});
+    sum += part.irradiance * ((first == 0 ? 4.0 : 3.0) / 16.0);
+    rays += part.primary;
+    const double apart = cv::norm(part.irradiance, whole.irradiance) / cv::norm(whole.irradiance);
+    EXPECT_GT(apart, 1e-4);
+    EXPECT_LT(apart, 0.1);
+  }
+  EXPECT_EQ(rays, whole.primary);
+  EXPECT_LT(cv::norm(sum, whole.irradiance, cv::NORM_INF), 1e-5 * cv::norm(whole.irradiance, cv::NORM_INF));
+}
+
 TEST(DirectRenderer, MoreRaysAtEdgesGiveThePixelsArea) {
   Scene scene = dented_scene(0.0, Lambertian{grey(0.7)});
   for (Lamp& lamp : scene.lamps)
