@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
+#include "apps/jpeg_answers.h"
 #include "core/error.h"
 #include "core/nearest_name.h"
 #include "core/short_text.h"
@@ -21,16 +22,8 @@ namespace {
 
 constexpr int kMostStreams = 24;
 constexpr int kMostCommands = 8;  // at once; a press takes seconds, and the next one waits for it
-constexpr const char* kBoundary = "touchstone-frame";
-constexpr const char* kFrameHeader = "X-Touchstone-Frame";
 constexpr const char* kForm = "application/x-www-form-urlencoded";
 constexpr std::array<std::string_view, 5> kPages = {"/", "/frame.jpg", "/status.json", "/stream.mjpg", "/truth.json"};
-
-void answer_error(httplib::Response& response, int status, const std::string& message) {
-  response.status = status;
-  const nlohmann::json json = {{"error", message}};
-  response.set_content(json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n", "application/json");
-}
 
 std::string page(const std::string& title) {
   const std::string name = plots::escape_markup(title);
@@ -69,22 +62,8 @@ struct FramePages::Parts {
       answer_error(response, status, message);
       return false;
     };
+    if (!request_may_go_on(request, response, contents.sources)) return false;
     const std::string host = request.get_header_value("Host");
-    if (request.get_header_value_count("Host") > 1 || request.get_header_value_count("Origin") > 1) {
-      return refuse(400, "Host and Origin may each stand once in a request");
-    }
-    if (!host_is_allowed(host, contents.sources)) {
-      return refuse(
-          421, fmt::format("Host: '{}' isn't answered; an address, localhost and the names given by --host are", host));
-    }
-    if (request.has_header("Origin")) {
-      const std::string origin = request.get_header_value("Origin");
-      if (!origin_is_allowed(origin, host, contents.sources)) {
-        return refuse(403,
-                      fmt::format("Origin: '{}' may not use this server; --allow-origin {} allows it", origin, origin));
-      }
-      response.set_header("Access-Control-Allow-Origin", origin);
-    }
     const bool is_command = contents.commands.contains(request.path);
     if (!is_command && std::find(kPages.begin(), kPages.end(), request.path) == kPages.end()) {
       std::vector<std::string> all(kPages.begin(), kPages.end());
@@ -109,9 +88,7 @@ struct FramePages::Parts {
   void one(httplib::Response& response) {
     const auto frame = camera.latest();
     if (!frame) return answer_error(response, 503, "the camera is being stopped");
-    response.set_header(kFrameHeader, std::to_string(frame->number));
-    response.set_header("Cache-Control", "no-store");
-    response.set_content(frame->jpeg, "image/jpeg");
+    answer_jpeg(response, *frame);
   }
 
   void stream(httplib::Response& response) {
@@ -119,21 +96,12 @@ struct FramePages::Parts {
       --streams;
       return answer_error(response, 503, fmt::format("{} clients are served; no more are", kMostStreams));
     }
-    response.set_header("Cache-Control", "no-store");
-    auto last = std::make_shared<std::int64_t>(-1);
-    response.set_content_provider(
-        fmt::format("multipart/x-mixed-replace; boundary={}", kBoundary),
-        [this, last](std::size_t, httplib::DataSink& sink) {
-          const auto frame = *last < 0 ? camera.latest() : camera.next(*last);
-          if (!frame) return false;
-          *last = frame->number;
-          const std::string head =
-              fmt::format("--{}\r\nContent-Type: image/jpeg\r\nContent-Length: {}\r\n{}: {}\r\n\r\n", kBoundary,
-                          frame->jpeg.size(), kFrameHeader, frame->number);
-          return sink.write(head.data(), head.size()) && sink.write(frame->jpeg.data(), frame->jpeg.size()) &&
-                 sink.write("\r\n", 2);
+    answer_jpegs(
+        response,
+        [this](std::int64_t after) -> std::shared_ptr<const NumberedJpeg> {
+          return after < 0 ? camera.latest() : camera.next(after);
         },
-        [this](bool) { --streams; });
+        [this] { --streams; });
   }
 
   void status(httplib::Response& response) {

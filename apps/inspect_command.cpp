@@ -8,7 +8,7 @@
 #include "datasets/inspection/contact_sheet.h"
 #include "datasets/inspection/inspected_draw.h"
 #include "datasets/inspection/inspection_page.h"
-#include "datasets/sets/frame_sequence.h"
+#include "datasets/sources/frame_sequence.h"
 #include "sim/files/image_file.h"
 
 namespace touchstone::apps {

@@ -48,7 +48,7 @@ void ProgressBar::keep_drawing() {
   while (!closing_.wait_for(lock, interval, [this] { return closed_; })) {
     const Clock::time_point now = Clock::now();
     const bool anew = terminal_ || drawn_ != done_ || seconds_between(last_drawn_, now) >= kSameAgain_s;
-    if (done_ < total_ && anew && seconds_between(last_drawn_, now) >= interval.count()) draw(now);
+    if ((done_ < total_ || total_ == 0) && anew && seconds_between(last_drawn_, now) >= interval.count()) draw(now);
   }
 }
 
@@ -66,7 +66,7 @@ void ProgressBar::show(const std::string& stage, std::int64_t done, std::int64_t
   const std::lock_guard<std::mutex> lock(mutex_);
   const Clock::time_point now = Clock::now();
   // A stage may come again, as folds do: threads report out of order, but not by half of all.
-  const bool again = total != total_ || (done_ >= total_ && 2 * done < total_);
+  const bool again = total != total_ || (total_ > 0 && done_ >= total_ && 2 * done < total_);
   if (stage != stage_ || again) {
     end_stage();
     stage_ = stage;
@@ -84,17 +84,21 @@ void ProgressBar::draw(Clock::time_point now) {
   const double elapsed = seconds_between(begun_, now);
   const double rate = elapsed > 0.0 ? static_cast<double>(done_ - first_) / elapsed : 0.0;
   const double part = total_ > 0 ? static_cast<double>(done_) / static_cast<double>(total_) : 0.0;
-  std::string text = fmt::format("{}/{}", done_, total_);
+  std::string text = total_ > 0 ? fmt::format("{}/{}", done_, total_) : fmt::format("{}", done_);
   if (rate > 0.0) text += fmt::format("  {:.3g}/s", rate);
   const auto expected = expected_s_.find(stage_);
   if (done_ < total_ && rate == 0.0 && expected != expected_s_.end()) {
     text += fmt::format("  about {} left", duration_text(std::max(0.0, expected->second - elapsed)));
-  } else if (done_ >= total_ || rate == 0.0) {
+  } else if (done_ >= total_ || rate == 0.0) {  // so where no end is known, too
     text += "  in " + duration_text(elapsed);
   } else {
     text += "  " + duration_text(static_cast<double>(total_ - done_) / rate) + " left";
   }
-  if (terminal_) {
+  if (total_ == 0 && terminal_) {
+    fmt::print(stderr, "\r\x1b[K{:<10} {}", stage_, text);
+  } else if (total_ == 0) {
+    fmt::print(stderr, "{}: {}\n", stage_, text);
+  } else if (terminal_) {
     const int full = std::clamp(static_cast<int>(part * kBarWidth), 0, kBarWidth);
     const std::string bar = std::string(full, '#') + std::string(kBarWidth - full, '.');
     fmt::print(stderr, "\r\x1b[K{:<10} [{}] {:3.0f} %  {}", stage_, bar, 100.0 * part, text);

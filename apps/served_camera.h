@@ -10,15 +10,14 @@
 #include <string>
 #include <vector>
 
+#include "apps/jpeg_answers.h"
 #include "lab/device/camera_state.h"
 
 namespace touchstone::apps {
 
 /// One frame as it is delivered. Its noise is that of its number: no two frames have the same.
-struct ServedFrame {
-  std::int64_t number = 0;
+struct ServedFrame : NumberedJpeg {
   std::shared_ptr<const lab::CameraState> state;
-  std::string jpeg;
 };
 
 /// Safe to use from many threads.

@@ -164,6 +164,23 @@ macro(touchstone_need_httplib)
     "CPPHTTPLIB_OPENSSL_SUPPORT;CPPHTTPLIB_ZLIB_SUPPORT;CPPHTTPLIB_BROTLI_SUPPORT")
 endmacro()
 
+# Not noted: only the video module links it, which is opened by its name.
+macro(touchstone_need_ffmpeg)
+  if(NOT TARGET FFmpeg::FFmpeg)
+    find_path(FFmpeg_INCLUDE libavformat/avformat.h)
+    foreach(_name avformat avcodec avutil swscale)
+      find_library(FFmpeg_${_name}_LIBRARY ${_name})
+      if(NOT FFmpeg_${_name}_LIBRARY OR NOT FFmpeg_INCLUDE)
+        touchstone_missing("FFmpeg's lib${_name}" "lib${_name}-dev")
+      endif()
+    endforeach()
+    add_library(FFmpeg::FFmpeg INTERFACE IMPORTED)
+    target_include_directories(FFmpeg::FFmpeg SYSTEM INTERFACE "${FFmpeg_INCLUDE}")
+    target_link_libraries(FFmpeg::FFmpeg INTERFACE "${FFmpeg_avformat_LIBRARY}" "${FFmpeg_avcodec_LIBRARY}"
+      "${FFmpeg_avutil_LIBRARY}" "${FFmpeg_swscale_LIBRARY}")
+  endif()
+endmacro()
+
 macro(touchstone_need_xxhash)
   touchstone_plain_library(XXHash::XXHash libxxhash-dev xxhash.h xxhash)
 endmacro()

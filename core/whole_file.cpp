@@ -13,6 +13,7 @@
 
 #include "core/error.h"
 #include "core/input_file.h"
+#include "core/whole_file_writer.h"
 
 namespace touchstone {
 namespace {
@@ -95,6 +96,30 @@ void write_whole_file(const std::filesystem::path& path, std::string_view conten
   TemporaryFile file(path);
   file.append(content);
   file.take_its_name();
+}
+
+struct WholeFileWriter::Parts {
+  explicit Parts(const std::filesystem::path& path) : file(path) {}
+
+  TemporaryFile file;
+  std::string waiting;
+};
+
+WholeFileWriter::WholeFileWriter(const std::filesystem::path& path) : parts_(std::make_unique<Parts>(path)) {}
+
+WholeFileWriter::~WholeFileWriter() = default;
+
+void WholeFileWriter::append(std::string_view content) {
+  constexpr std::size_t kMostWaiting = 1 << 16;
+  parts_->waiting += content;
+  if (parts_->waiting.size() < kMostWaiting) return;
+  parts_->file.append(parts_->waiting);
+  parts_->waiting.clear();
+}
+
+void WholeFileWriter::finish() {
+  parts_->file.append(parts_->waiting);
+  parts_->file.take_its_name();
 }
 
 void write_lasting_file(const std::filesystem::path& path, std::string_view content) {

@@ -5,8 +5,8 @@
 
 #include "apps/command.h"
 #include "apps/estimators/chroma_grid.h"
+#include "apps/estimators/source_options.h"
 #include "apps/progress_bar.h"
-#include "datasets/sets/frame_sequence.h"
 #include "lab/chroma/chroma_fields.h"
 #include "sensors/colour/hue_model_file.h"
 #include "sensors/tractions/marker_compliance_file.h"
@@ -17,14 +17,13 @@ namespace {
 struct EstimateOptions {
   std::filesystem::path model;
   std::filesystem::path rest;
-  std::filesystem::path frames;
   std::filesystem::path compliance;
   std::filesystem::path out;
   std::string grid = "10x10";
   sensors::TractionSettings inversion;
 };
 
-void estimate(const EstimateOptions& options, const GlobalOptions& global) {
+void estimate(const EstimateOptions& options, const SourceOptions& source, const GlobalOptions& global) {
   const sensors::HueModel model = sensors::load_hue_model(options.model);
   const Eigen::Vector2i grid = grid_of(options.grid);
   std::optional<lab::FieldForces> forces;
@@ -32,12 +31,11 @@ void estimate(const EstimateOptions& options, const GlobalOptions& global) {
     forces = lab::FieldForces{sensors::load_marker_compliance(options.compliance), options.inversion};
   }
   ProgressBar bar(global.quiet);
-  const std::vector<std::filesystem::path> frames = datasets::picture_files(options.frames);
   const lab::FieldSummary summary =
-      lab::write_chroma_fields(model, grid, options.rest, frames, forces, options.out, bar.listener());
+      lab::write_chroma_fields(model, grid, options.rest, opened_streams(source), forces, options.out, bar.listener());
   warn_of_faults(summary.faults);
   fmt::print("{}: displacements.csv{} of {} frames\n", options.out.string(), forces ? " and forces.csv" : "",
-             std::ssize(frames) - std::ssize(summary.faults));
+             summary.frames - std::ssize(summary.faults));
   fmt::print("  {} of {} markers measured, {} of them beyond what calibration saw\n", summary.measured, summary.markers,
              summary.extrapolated);
   if (summary.without_force > 0) {
@@ -53,8 +51,7 @@ void add_chroma_estimation(CLI::App& estimations, const GlobalOptions& global, A
   auto options = std::make_shared<EstimateOptions>();
   command->add_option("--model", options->model, "The model that `touchstone calibrate chroma` made")->required();
   command->add_option("--rest", options->rest, "The picture of the unloaded sensor as it is mounted now")->required();
-  command->add_option("--frames", options->frames, "A folder of frames, taken in natural order of their names")
-      ->required();
+  const auto source = add_source_options(*command, "--frames", {});
   add_grid_option(*command, options->grid);
   command->add_option("--compliance", options->compliance,
                       "The gel's, by `touchstone export compliance`: forces and friction, too");
@@ -67,7 +64,9 @@ void add_chroma_estimation(CLI::App& estimations, const GlobalOptions& global, A
       ->check(CLI::Range(1e-5, 1.0))
       ->capture_default_str();
   command->add_option("-o,--out", options->out, "The folder of displacements.csv and forces.csv")->required();
-  command->callback([&action, options, &global] { action = [options, &global] { estimate(*options, global); }; });
+  command->callback([&action, options, source, &global] {
+    action = [options, source, &global] { estimate(*options, *source, global); };
+  });
 }
 
 }  // namespace touchstone::apps

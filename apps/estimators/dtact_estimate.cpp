@@ -2,8 +2,8 @@
 #include <memory>
 
 #include "apps/command.h"
+#include "apps/estimators/source_options.h"
 #include "apps/progress_bar.h"
-#include "datasets/sets/frame_sequence.h"
 #include "lab/dtact/darkness_maps.h"
 #include "sensors/heights/darkness_model_file.h"
 
@@ -12,18 +12,17 @@ namespace {
 
 struct EstimateOptions {
   std::filesystem::path model;
-  std::filesystem::path frames;
   std::filesystem::path out;
   std::string format = "exr";
   bool doubt = false;
 };
 
-void estimate(const EstimateOptions& options, const GlobalOptions& global) {
+void estimate(const EstimateOptions& options, const SourceOptions& source, const GlobalOptions& global) {
   const sensors::DarknessModel model = sensors::load_darkness_model(options.model);
   const lab::HeightFormat format = options.format == "exr" ? lab::HeightFormat::exr : lab::HeightFormat::png16;
   ProgressBar bar(global.quiet);
-  const std::vector<lab::DarknessRecord> records = lab::write_darkness_maps(
-      model, datasets::picture_files(options.frames), options.out, format, options.doubt, bar.listener());
+  const std::vector<lab::DarknessRecord> records =
+      lab::write_darkness_maps(model, opened_streams(source), options.out, format, options.doubt, bar.listener());
   const std::vector<std::string> faults = lab::faults_of(records);
   warn_of_faults(faults);
   const auto count = [&](auto fault) { return std::count_if(records.begin(), records.end(), fault); };
@@ -48,8 +47,7 @@ void add_9dtact_estimation(CLI::App& estimations, const GlobalOptions& global, A
   CLI::App* command = estimations.add_subcommand("9dtact", "Height maps from its frames");
   auto options = std::make_shared<EstimateOptions>();
   command->add_option("--model", options->model, "The model that `touchstone calibrate 9dtact` made")->required();
-  command->add_option("--frames", options->frames, "A folder of frames, taken in natural order of their names")
-      ->required();
+  const auto source = add_source_options(*command, "--frames", {});
   command->add_option("-o,--out", options->out, "The folder of the height maps and their summary, heights.csv")
       ->required();
   command
@@ -61,7 +59,9 @@ void add_9dtact_estimation(CLI::App& estimations, const GlobalOptions& global, A
       "--doubt", options->doubt,
       "Also write FRAME-doubt.png: a pixel adds 1 if saturated, 2 if unlit, 4 if darker and 8 if brighter "
       "than calibrated");
-  command->callback([&action, options, &global] { action = [options, &global] { estimate(*options, global); }; });
+  command->callback([&action, options, source, &global] {
+    action = [options, source, &global] { estimate(*options, *source, global); };
+  });
 }
 
 }  // namespace touchstone::apps

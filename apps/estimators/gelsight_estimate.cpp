@@ -1,31 +1,44 @@
 #include <algorithm>
+#include <functional>
 #include <memory>
 
 #include "apps/command.h"
+#include "apps/estimators/live_options.h"
+#include "apps/estimators/source_options.h"
 #include "apps/progress_bar.h"
-#include "datasets/sets/frame_sequence.h"
 #include "lab/gelsight/height_maps.h"
 #include "sensors/heights/height_model_file.h"
+#include "sensors/heights/height_overlay.h"
 
 namespace touchstone::apps {
 namespace {
 
+constexpr double kWhite_mm = 1.0;  // of the live view's heights
+
 struct EstimateOptions {
   std::filesystem::path model;
-  std::filesystem::path frames;
   std::filesystem::path out;
   std::string border = "zero";
   std::string format = "exr";
 };
 
-void estimate(const EstimateOptions& options, const GlobalOptions& global) {
+void estimate(const EstimateOptions& options, const SourceOptions& source, const LiveOptions& live,
+              const GlobalOptions& global) {
   const sensors::HeightModel model = sensors::load_height_model(options.model);
   sensors::HeightSettings settings;
   if (options.border == "free") settings.border = sensors::HeightBorder::free;
   const lab::HeightFormat format = options.format == "exr" ? lab::HeightFormat::exr : lab::HeightFormat::png16;
+  const std::unique_ptr<LiveView> view = opened_view(live, "heights of " + source.choice.place);
+  std::function<void(const cv::Mat&, const sensors::HeightResult&)> show;
+  if (view) {
+    show = [&view, picture = cv::Mat()](const cv::Mat& frame, const sensors::HeightResult& result) mutable {
+      sensors::draw_overlay(frame, result, kWhite_mm, picture);
+      view->show(picture);
+    };
+  }
   ProgressBar bar(global.quiet);
-  const std::vector<lab::HeightRecord> records = lab::write_height_maps(
-      model, settings, datasets::picture_files(options.frames), options.out, format, bar.listener());
+  const std::vector<lab::HeightRecord> records =
+      lab::write_height_maps(model, settings, opened_streams(source), options.out, format, bar.listener(), show);
   const std::vector<std::string> faults = lab::faults_of(records);
   warn_of_faults(faults);
   const auto count = [&](auto fault) { return std::count_if(records.begin(), records.end(), fault); };
@@ -47,8 +60,7 @@ void add_gelsight_estimation(CLI::App& estimations, const GlobalOptions& global,
   CLI::App* command = estimations.add_subcommand("gelsight", "Height maps from its frames");
   auto options = std::make_shared<EstimateOptions>();
   command->add_option("--model", options->model, "The model that `touchstone calibrate gelsight` made")->required();
-  command->add_option("--frames", options->frames, "A folder of frames, taken in natural order of their names")
-      ->required();
+  const auto source = add_source_options(*command, "--frames", {});
   command->add_option("-o,--out", options->out, "The folder of the height maps and their summary, heights.csv")
       ->required();
   command
@@ -61,7 +73,10 @@ void add_gelsight_estimation(CLI::App& estimations, const GlobalOptions& global,
                    "'exr': floats in mm; 'png16': 16 bit, 0.1 um a level, level 10000 is 0 mm")
       ->check(CLI::IsMember({"exr", "png16"}))
       ->capture_default_str();
-  command->callback([&action, options, &global] { action = [options, &global] { estimate(*options, global); }; });
+  const auto live = add_live_options(*command);
+  command->callback([&action, options, source, live, &global] {
+    action = [options, source, live, &global] { estimate(*options, *source, *live, global); };
+  });
 }
 
 }  // namespace touchstone::apps

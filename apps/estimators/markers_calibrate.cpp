@@ -27,8 +27,8 @@ void calibrate(const CalibrateOptions& options, const MarkerOptions& frames, con
   lab::TouchForceCalibration made;
   {
     ProgressBar bar(global.quiet);
-    made = lab::calibrate_touch_forces(marker_frames(frames), parts, frames.rest, frames.source.filename().string(),
-                                       options.indenter, bar.listener());
+    made = lab::calibrate_touch_forces(opened_streams(*frames.source), parts, frames.rest,
+                                       name_of_source(*frames.source), options.indenter, bar.listener());
   }
   sensors::save(made.fit.model, options.out);
   warn_of_faults(made.faults);

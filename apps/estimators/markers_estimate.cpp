@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "apps/command.h"
+#include "apps/estimators/live_options.h"
 #include "apps/estimators/marker_options.h"
 #include "apps/progress_bar.h"
 #include "core/error.h"
@@ -57,15 +58,17 @@ void print_errors(const std::vector<lab::MarkerTrack>& tracks) {
   }
 }
 
-void estimate(const EstimateOptions& options, const MarkerOptions& chosen, const GlobalOptions& global) {
+void estimate(const EstimateOptions& options, const MarkerOptions& chosen, const LiveOptions& live,
+              const GlobalOptions& global) {
   lab::MarkerTrackSettings settings = options.settings;
   settings.rest = chosen.rest;
-  settings.times_known = times_known(chosen);
   settings.touch = wanted_touches(options, chosen);
+  const std::unique_ptr<LiveView> view = opened_view(live, "markers of " + chosen.source->choice.place);
+  settings.show = shown_in(view.get());
   std::vector<lab::MarkerTrack> tracks;
   {
     ProgressBar bar(global.quiet);
-    tracks = lab::write_marker_tracks(marker_frames(chosen), settings, options.out, bar.listener());
+    tracks = lab::write_marker_tracks(opened_streams(*chosen.source), settings, options.out, bar.listener());
   }
   std::int64_t frames = 0;
   for (const lab::MarkerTrack& track : tracks) {
@@ -111,10 +114,11 @@ void add_markers_estimation(CLI::App& estimations, const GlobalOptions& global, 
                    "Length of these arrows for a displacement of 1 px, px")
       ->check(CLI::Range(0.1, 1000.0))
       ->capture_default_str();
+  const auto live = add_live_options(*command);
   command->add_option("-o,--out", options->out, "The folder of markers.csv, touch.csv and of the folder 'overlay'")
       ->required();
-  command->callback([&action, options, frames, &global] {
-    action = [options, frames, &global] { estimate(*options, *frames, global); };
+  command->callback([&action, options, frames, live, &global] {
+    action = [options, frames, live, &global] { estimate(*options, *frames, *live, global); };
   });
 }
 

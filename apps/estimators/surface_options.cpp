@@ -7,8 +7,7 @@ namespace touchstone::apps {
 
 std::shared_ptr<SurfaceOptions> add_surface_options(CLI::App& command) {
   auto options = std::make_shared<SurfaceOptions>();
-  command.add_option("--frames", options->frames,
-                     "A folder of frames of a coated gel, taken in natural order of their names");
+  options->frames = add_source_options(command, "--frames", {}, false);
   command.add_option("--heights", options->heights,
                      "The height model of --frames, that `touchstone calibrate gelsight` made");
   command.add_option(
@@ -20,19 +19,20 @@ std::shared_ptr<SurfaceOptions> add_surface_options(CLI::App& command) {
 }
 
 lab::HeightSource height_source(const SurfaceOptions& options) {
-  if (options.frames.empty() == options.maps.empty()) fail("give either --frames DIR or --maps DIR");
-  if (!options.frames.empty()) {
+  const bool frames = !options.frames->choice.place.empty();
+  if (frames != options.maps.empty()) fail("give either --frames SOURCE or --maps DIR");
+  if (frames) {
     if (options.heights.empty()) fail("--frames needs --heights MODEL");
     if (options.mm_per_px > 0.0) fail("--mm-per-px: it is the height model's");
-    return {sensors::load_height_model(options.heights), options.frames};
+    return {sensors::load_height_model(options.heights), opened_streams(*options.frames)};
   }
   if (!options.heights.empty()) fail("--heights is for --frames; --maps are heights already");
   if (options.mm_per_px == 0.0) fail("--maps needs --mm-per-px MM");
   return {options.maps, options.mm_per_px};
 }
 
-const std::filesystem::path& folder_of(const SurfaceOptions& options) {
-  return options.frames.empty() ? options.maps : options.frames;
+std::filesystem::path folder_of(const SurfaceOptions& options) {
+  return options.maps.empty() ? std::filesystem::path(options.frames->choice.place) : options.maps;
 }
 
 }  // namespace touchstone::apps

@@ -8,30 +8,20 @@
 namespace touchstone::apps {
 namespace {
 
-std::vector<datasets::FrameSequence> chosen_frames(const FrameOptions& options) {
-  if (options.data.empty() == options.frames.empty()) fail("give either --data DIR or --frames DIR");
-  if (!options.data.empty()) {
-    std::optional<datasets::Split> split;
-    if (!options.split.empty() && options.split != "all") split = datasets::split_named(options.split);
-    return datasets::frames_of_data_set(options.data, split);
-  }
-  if (!options.forces.empty()) return {datasets::frames_of_force_table(options.frames, options.forces)};
-  if (options.frame_rate_Hz <= 0.0) fail("--frames needs --forces CSV or --frame-rate HZ, for the frames' times");
-  return {datasets::frames_of_folder(options.frames, options.frame_rate_Hz)};
+/// A tracker's results without times would be of no use. @throws Error if a recording's aren't known
+void require_times(const datasets::FrameStream& stream) {
+  if (stream.live) return;
+  const std::unique_ptr<datasets::FrameSource> source = stream.open();
+  datasets::SourceFrame frame;
+  if (!source->next(frame) || !frame.fault.empty() || frame.label.timed) return;
+  fail("{}: when its frames were taken isn't known; --rate HZ, --times CSV or --forces CSV says it", stream.name);
 }
 
 }  // namespace
 
 std::shared_ptr<FrameOptions> add_frame_options(CLI::App& command, const std::string& split) {
   auto options = std::make_shared<FrameOptions>();
-  options->split = split;
-  command.add_option("--data", options->data, "A data set that `touchstone generate` made");
-  command.add_option("--split", options->split, "Its scenes: train, validate, test or all")->capture_default_str();
-  command.add_option("--frames", options->frames, "A folder of recorded frames, taken in natural order of their names");
-  command.add_option("--forces", options->forces,
-                     "Times and forces of recorded frames: CSV with the header "
-                     "file,t_us,force_x_N,force_y_N,force_z_N");
-  command.add_option("--frame-rate", options->frame_rate_Hz, "Of recorded frames without --forces, in Hz");
+  options->source = add_source_options(command, "--frames", {.split = split, .forces = true});
   command.add_option("--roi-a", options->tracker.roi_a_px, "Side of the region that holds all beads, px")
       ->capture_default_str();
   command.add_option("--roi-b", options->tracker.roi_b_px, "Side of the window round one bead, px")
@@ -42,14 +32,18 @@ std::shared_ptr<FrameOptions> add_frame_options(CLI::App& command, const std::st
   return options;
 }
 
-std::vector<lab::TrackedSequence> tracked_frames(const FrameOptions& options, const GlobalOptions& global) {
+std::vector<lab::TrackedSequence> tracked_frames(
+    const FrameOptions& options, const GlobalOptions& global,
+    const std::function<void(const cv::Mat& frame, const sensors::TrackedBeads& beads)>& show) {
   sensors::BeadTrackerSettings settings = options.tracker;
   if (options.bright_beads) settings.appearance.polarity = sensors::BeadPolarity::kBright;
   if (options.weighted_centroid) settings.centroid = sensors::CentroidKind::kWeighted;
+  const std::vector<datasets::FrameStream> streams = opened_streams(*options.source);
+  for (const datasets::FrameStream& stream : streams) require_times(stream);
   std::vector<lab::TrackedSequence> tracked;
   {
     ProgressBar bar(global.quiet);
-    tracked = lab::track(chosen_frames(options), settings, bar.listener());
+    tracked = lab::track(streams, settings, bar.listener(), show);
   }
   for (const lab::TrackedSequence& sequence : tracked) {
     warn_of_faults(sequence.faults);

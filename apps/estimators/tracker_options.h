@@ -1,24 +1,20 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
-#include <filesystem>
+#include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "apps/command.h"
+#include "apps/estimators/source_options.h"
 #include "lab/vhs/vhs_experiment.h"
 
 namespace touchstone::apps {
 
 /// Where frames come from, and how beads are found in them: common to calibrate and estimate.
 struct FrameOptions {
-  std::filesystem::path data;    ///< a data set, or empty
-  std::string split;             ///< of the data set; empty: all
-  std::filesystem::path frames;  ///< a folder of recorded frames, or empty
-  std::filesystem::path forces;  ///< their forces, or empty
-  double frame_rate_Hz = 0.0;    ///< of recorded frames without a table
+  std::shared_ptr<SourceOptions> source;
   sensors::BeadTrackerSettings tracker;
   bool bright_beads = false;
   bool weighted_centroid = false;
@@ -28,7 +24,9 @@ struct FrameOptions {
 std::shared_ptr<FrameOptions> add_frame_options(CLI::App& command, const std::string& split);
 
 /// The sequences that the options name, tracked. Shows progress unless asked to be quiet, and warns of lost beads.
-/// @throws Error if they don't fit together
-std::vector<lab::TrackedSequence> tracked_frames(const FrameOptions& options, const GlobalOptions& global);
+/// @param show as lab::track's @throws Error if they don't fit together
+std::vector<lab::TrackedSequence> tracked_frames(
+    const FrameOptions& options, const GlobalOptions& global,
+    const std::function<void(const cv::Mat& frame, const sensors::TrackedBeads& beads)>& show = {});
 
 }  // namespace touchstone::apps

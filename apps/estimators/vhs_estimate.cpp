@@ -1,11 +1,13 @@
 #include <memory>
 
 #include "apps/command.h"
+#include "apps/estimators/live_options.h"
 #include "apps/estimators/tracker_options.h"
 #include "core/error.h"
 #include "core/whole_file.h"
 #include "datasets/sets/csv_cells.h"
 #include "lab/vhs/bead_tractions.h"
+#include "sensors/beads/bead_overlay.h"
 #include "sensors/beads/stiffness_model_file.h"
 #include "sensors/tractions/marker_compliance_file.h"
 
@@ -80,7 +82,21 @@ void write_distribution(const EstimateOptions& options, const std::vector<lab::T
   }
 }
 
-void estimate(const EstimateOptions& options, const FrameOptions& frames, const GlobalOptions& global) {
+/// What shows each frame's beads with the force that they give; of the model's rest positions, or those of the first
+/// frame that is shown.
+std::function<void(const cv::Mat&, const sensors::TrackedBeads&)> shown_forces(
+    LiveView* view, const sensors::StiffnessForceModel& model, bool first_is_rest) {
+  if (view == nullptr) return {};
+  const std::vector<Eigen::Vector2d> rest = first_is_rest ? std::vector<Eigen::Vector2d>() : model.rest;
+  return [view, &model, rest, picture = cv::Mat()](const cv::Mat& frame, const sensors::TrackedBeads& beads) mutable {
+    if (rest.empty()) rest = beads.positions;
+    sensors::draw_overlay(frame, beads, sensors::estimate(model, beads, rest), picture);
+    view->show(picture);
+  };
+}
+
+void estimate(const EstimateOptions& options, const FrameOptions& frames, const LiveOptions& live,
+              const GlobalOptions& global) {
   if (options.compliance.empty() != options.distribution.empty()) {
     fail("--compliance and --distribution belong together: the gel's compliance, and the folder for the result");
   }
@@ -88,9 +104,12 @@ void estimate(const EstimateOptions& options, const FrameOptions& frames, const 
   const sensors::StiffnessForceModel model = sensors::load_stiffness_model(options.model);
   FrameOptions with_grid = frames;
   with_grid.tracker.grid = model.grid;
-  const std::vector<lab::TrackedSequence> tracked = tracked_frames(with_grid, global);
+  const bool first_is_rest = options.rest == "first";
+  const std::unique_ptr<LiveView> view = opened_view(live, "forces of " + frames.source->choice.place);
+  const std::vector<lab::TrackedSequence> tracked =
+      tracked_frames(with_grid, global, shown_forces(view.get(), model, first_is_rest));
   if (!options.compliance.empty()) write_distribution(options, tracked, model);
-  const lab::RestChoice rest = options.rest == "first" ? lab::RestChoice::first_frame : lab::RestChoice::model;
+  const lab::RestChoice rest = first_is_rest ? lab::RestChoice::first_frame : lab::RestChoice::model;
   const std::vector<lab::ForceRecord> records = lab::estimate_forces(tracked, model, rest);
   if (!options.out.empty()) {
     write_whole_file(options.out, csv_of(records));
@@ -101,7 +120,8 @@ void estimate(const EstimateOptions& options, const FrameOptions& frames, const 
     if (options.out.empty() && options.distribution.empty()) fmt::print("{}", csv_of(records));
     return;
   }
-  fmt::print("Force by load, {}:\n", frames.data.empty() ? "recorded frames" : "split '" + frames.split + "'");
+  fmt::print("Force by load, {}:\n",
+             frames.source->choice.forces.empty() ? "split '" + frames.source->split + "'" : "recorded frames");
   print_verification(lab::verify_forces(records));
   print_errors("Over all frames:", lab::force_errors(records));
 }
@@ -136,8 +156,9 @@ void add_vhs_estimation(CLI::App& estimations, const GlobalOptions& global, Acti
                    "Error of a bead's displacement along x and y, for the tractions")
       ->check(CLI::Range(1e-5, 1.0))
       ->capture_default_str();
-  command->callback([&action, &global, options, frames] {
-    action = [options, frames, &global] { estimate(*options, *frames, global); };
+  const auto live = add_live_options(*command);
+  command->callback([&action, &global, options, frames, live] {
+    action = [options, frames, live, &global] { estimate(*options, *frames, *live, global); };
   });
 }
 

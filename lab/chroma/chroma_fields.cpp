@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/whole_file.h"
+#include "core/whole_file_writer.h"
 #include "datasets/inspection/on_picture.h"
 #include "datasets/sets/csv_cells.h"
 #include "sensors/tractions/friction_state.h"
@@ -128,8 +128,9 @@ void find_rest_of(sensors::ColourMarkerFinder& finder, const fs::path& picture) 
 }
 
 FieldSummary write_chroma_fields(const sensors::HueModel& model, const Eigen::Vector2i& grid, const fs::path& rest,
-                                 const std::vector<fs::path>& frames, const std::optional<FieldForces>& forces,
-                                 const fs::path& folder, const Progress& progress) {
+                                 const std::vector<datasets::FrameStream>& streams,
+                                 const std::optional<FieldForces>& forces, const fs::path& folder,
+                                 const Progress& progress) {
   sensors::ColourMarkerFinder finder({.grid = grid});
   find_rest_of(finder, rest);
   const sensors::HueEstimator estimator(model, finder.rest());
@@ -139,32 +140,41 @@ FieldSummary write_chroma_fields(const sensors::HueModel& model, const Eigen::Ve
     table.emplace(*forces, model.parallax);
   }
   fs::create_directories(folder);
-  std::string displacements = fmt::format("{}{}\n", kDisplacementColumns, table ? kElasticColumns : "");
-  std::string wrenches = ForceTable::header();
+  WholeFileWriter displacements(folder / "displacements.csv");
+  displacements.append(fmt::format("{}{}\n", kDisplacementColumns, table ? kElasticColumns : ""));
+  std::optional<WholeFileWriter> wrenches;
+  if (table) wrenches.emplace(folder / "forces.csv");
+  if (table) wrenches->append(ForceTable::header());
+  const std::int64_t total = datasets::frames_of(streams);
   FieldSummary summary;
-  for (const fs::path& frame : frames) {
-    const std::string name = datasets::csv_cell(frame.filename().string());
-    std::string fault = datasets::fault_on_picture(frame, [&](const cv::Mat& image) {
+  datasets::for_each_frame(streams, [&](const datasets::SourceFrame& frame) {
+    const std::string name =
+        datasets::csv_cell((fs::path(frame.stem).parent_path() / frame.label.file.filename()).string());
+    std::string lines, force_line;
+    std::string fault = datasets::fault_on_frame(frame, [&](const cv::Mat& image) {
       const sensors::ColourMarkerReading& reading = finder.find(image);
       const sensors::HueField field = estimator.estimate(reading);
       sensors::MarkerField elastic;
-      if (table) elastic = table->add(name, field, wrenches);
-      add_displacements(name, reading, field, table ? &elastic : nullptr, displacements);
+      if (table) elastic = table->add(name, field, force_line);
+      add_displacements(name, reading, field, table ? &elastic : nullptr, lines);
       if (table && elastic.displacement.empty()) ++summary.without_force;
       summary.markers += static_cast<int>(reading.markers.size());
       summary.measured += static_cast<int>(std::count(field.field.measured.begin(), field.field.measured.end(), 1));
       summary.extrapolated += static_cast<int>(std::count(field.extrapolated.begin(), field.extrapolated.end(), 1));
     });
     if (!fault.empty()) {
-      displacements += fmt::format("{},,,,,0,0,{}{}\n", name, datasets::csv_cell(fault), table ? ",,," : "");
+      lines = fmt::format("{},,,,,0,0,{}{}\n", name, datasets::csv_cell(fault), table ? ",,," : "");
+      force_line.clear();
       summary.faults.push_back(std::move(fault));
     }
+    displacements.append(lines);
+    if (wrenches) wrenches->append(force_line);
     ++summary.frames;
-    if (progress) progress("fields", summary.frames, std::ssize(frames));
-  }
-  datasets::require_a_frame(summary.faults, frames.size());
-  write_whole_file(folder / "displacements.csv", displacements);
-  if (table) write_whole_file(folder / "forces.csv", wrenches);
+    if (progress) progress("fields", summary.frames, total);
+  });
+  datasets::require_a_frame(summary.faults, static_cast<std::size_t>(summary.frames));
+  displacements.finish();
+  if (wrenches) wrenches->finish();
   return summary;
 }
 

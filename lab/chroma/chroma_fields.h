@@ -1,5 +1,5 @@
 #pragma once
-// Fields and forces of a chroma sensor on disk, from frames on disk.
+// Fields and forces of a chroma sensor on disk, from frames of any source.
 
 #include <filesystem>
 #include <optional>
@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/progress.h"
+#include "datasets/sources/frame_source.h"
 #include "sensors/colour/colour_marker_finder.h"
 #include "sensors/colour/hue_estimator.h"
 #include "sensors/tractions/marker_compliance.h"
@@ -31,14 +32,14 @@ struct FieldSummary {
 };
 
 /// Estimates each frame, in their order, and writes FOLDER/displacements.csv and, if `forces` are given,
-/// FOLDER/forces.csv when all are done (docs/file-formats.md, "Recorded frames"). The folder is made if it isn't
-/// there. A frame that can't be read or is unfit (see ColourMarkerFinder) has one line, whose `flaw` says what is
-/// wrong.
+/// FOLDER/forces.csv (docs/file-formats.md, "Recorded frames"), as frames come: they are there when all are done. The
+/// folder is made if it isn't there. A frame that can't be read or is unfit (see ColourMarkerFinder) has one line,
+/// whose `flaw` says what is wrong.
 /// @param rest the picture of the unloaded sensor
 /// @throws Error naming the picture at rest if it can't be read or is unfit, or if all frames are; for a model that
 ///   doesn't fit the grid, or a compliance of another grid or another spacing than the model's
 FieldSummary write_chroma_fields(const sensors::HueModel& model, const Eigen::Vector2i& grid,
-                                 const std::filesystem::path& rest, const std::vector<std::filesystem::path>& frames,
+                                 const std::filesystem::path& rest, const std::vector<datasets::FrameStream>& streams,
                                  const std::optional<FieldForces>& forces, const std::filesystem::path& folder,
                                  const Progress& progress = {});
 

@@ -48,30 +48,32 @@ DarknessRecord record_of(const sensors::DarknessResult& result, double pixel_mm2
 }  // namespace
 
 std::vector<DarknessRecord> write_darkness_maps(const sensors::DarknessModel& model,
-                                                const std::vector<fs::path>& frames, const fs::path& folder,
-                                                HeightFormat format, bool doubt, const Progress& progress) {
+                                                const std::vector<datasets::FrameStream>& streams,
+                                                const fs::path& folder, HeightFormat format, bool doubt,
+                                                const Progress& progress) {
   sensors::DarknessEstimator estimator(model);
   fs::create_directories(folder);
   const double pixel_mm2 = model.mm_per_px * model.mm_per_px;
+  const std::int64_t total = datasets::frames_of(streams);
   std::vector<DarknessRecord> records;
-  for (const fs::path& frame : frames) {
+  datasets::for_each_frame(streams, [&](const datasets::SourceFrame& frame) {
     DarknessRecord record;
     const sensors::DarknessResult* result = nullptr;
-    const std::string fault = datasets::fault_on_picture(frame, [&](const cv::Mat& image) {
+    const std::string fault = datasets::fault_on_frame(frame, [&](const cv::Mat& image) {
       result = &estimator.estimate(image);
       record = record_of(*result, pixel_mm2);
     });
-    record.file = frame.filename().string();
+    record.file = name_in_table(frame);
     if (fault.empty()) {
-      write_height_map(result->height_mm, folder / frame.filename(), format);
-      if (doubt) sim::write_png(folder / (frame.stem().string() + "-doubt.png"), result->doubt);
+      write_height_map(result->height_mm, folder / (frame.stem + ".png"), format);
+      if (doubt) sim::write_png(folder / (frame.stem + "-doubt.png"), result->doubt);
     } else {
       record.trusted = false;
       record.fault = fault;
     }
     records.push_back(record);
-    if (progress) progress("heights", std::ssize(records), std::ssize(frames));
-  }
+    if (progress) progress("heights", std::ssize(records), total);
+  });
   faults_of(records);  // an error where there is nothing to write
   write_whole_file(folder / "heights.csv", csv_of(records));
   return records;

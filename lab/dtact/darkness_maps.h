@@ -1,5 +1,5 @@
 #pragma once
-// Height maps on disk, from frames of a gel that shows depth as darkness.
+// Height maps on disk, from frames, of any source, of a gel that shows depth as darkness.
 
 #include <filesystem>
 #include <string>
@@ -27,13 +27,12 @@ struct DarknessRecord {
   std::string fault = {};  ///< as HeightRecord's
 };
 
-/// Estimates each frame and writes FOLDER/STEM.exr or .png; with `doubt` also FOLDER/STEM-doubt.png (bits of
-/// sensors::Doubt); and FOLDER/heights.csv when all are done. The folder is made if it isn't there.
-/// A frame that can't be read or estimated has a record with its fault, and no map.
-/// @pre no two frames have one stem (datasets::picture_files)
+/// Estimates each frame of each stream and writes FOLDER/STEM.exr or .png (of several streams FOLDER/SEQUENCE/STEM);
+/// with `doubt` also STEM-doubt.png (bits of sensors::Doubt); and FOLDER/heights.csv when all are done. Folders are
+/// made if they aren't there. A frame that can't be read or estimated has a record with its fault, and no map.
 /// @throws Error if there is a fault in each of them
 std::vector<DarknessRecord> write_darkness_maps(const sensors::DarknessModel& model,
-                                                const std::vector<std::filesystem::path>& frames,
+                                                const std::vector<datasets::FrameStream>& streams,
                                                 const std::filesystem::path& folder, HeightFormat format, bool doubt,
                                                 const Progress& progress = {});
 

@@ -33,6 +33,7 @@ std::string csv_of(const std::vector<HeightRecord>& records) {
 }  // namespace
 
 void write_height_map(const cv::Mat& height_mm, fs::path file, HeightFormat format) {
+  if (file.has_parent_path()) fs::create_directories(file.parent_path());
   if (format == HeightFormat::exr) {
     sim::write_exr(file.replace_extension(".exr"), height_mm, {"height_mm"});
     return;
@@ -44,18 +45,26 @@ void write_height_map(const cv::Mat& height_mm, fs::path file, HeightFormat form
       {{"mm_per_level", fmt::format("{}", 1.0 / kLevelsPerMm)}, {"zero_level", fmt::format("{}", kZeroLevel)}});
 }
 
-std::vector<HeightRecord> write_height_maps(const sensors::HeightModel& model, const sensors::HeightSettings& settings,
-                                            const std::vector<fs::path>& frames, const fs::path& folder,
-                                            HeightFormat format, const Progress& progress) {
+std::string name_in_table(const datasets::SourceFrame& frame) {
+  const fs::path folder = fs::path(frame.stem).parent_path();
+  return (folder / frame.label.file.filename()).string();
+}
+
+std::vector<HeightRecord> write_height_maps(
+    const sensors::HeightModel& model, const sensors::HeightSettings& settings,
+    const std::vector<datasets::FrameStream>& streams, const fs::path& folder, HeightFormat format,
+    const Progress& progress,
+    const std::function<void(const cv::Mat& frame, const sensors::HeightResult& result)>& show) {
   sensors::HeightEstimator estimator(model, settings);
   fs::create_directories(folder);
   const double pixel_mm2 = model.mm_per_px * model.mm_per_px;
+  const std::int64_t total = datasets::frames_of(streams);
   std::vector<HeightRecord> records;
-  for (const fs::path& frame : frames) {
+  datasets::for_each_frame(streams, [&](const datasets::SourceFrame& frame) {
     HeightRecord record;
-    record.file = frame.filename().string();
+    record.file = name_in_table(frame);
     cv::Mat height_mm;
-    record.fault = datasets::fault_on_picture(frame, [&](const cv::Mat& image) {
+    record.fault = datasets::fault_on_frame(frame, [&](const cv::Mat& image) {
       const sensors::HeightResult& result = estimator.estimate(image);
       cv::minMaxLoc(result.height_mm, nullptr, &record.highest_mm);
       record.volume_mm3 = pixel_mm2 * cv::sum(result.height_mm)[0];
@@ -64,15 +73,16 @@ std::vector<HeightRecord> write_height_maps(const sensors::HeightModel& model, c
       record.trusted = result.trusted();
       record.contact_at_border = result.contact_at_border;
       height_mm = result.height_mm;
+      if (show) show(image, result);
     });
     if (record.fault.empty()) {
-      write_height_map(height_mm, folder / frame.filename(), format);
+      write_height_map(height_mm, folder / (frame.stem + ".png"), format);
     } else {
       record.trusted = false;
     }
     records.push_back(record);
-    if (progress) progress("heights", std::ssize(records), std::ssize(frames));
-  }
+    if (progress) progress("heights", std::ssize(records), total);
+  });
   faults_of(records);  // an error where there is nothing to write
   write_whole_file(folder / "heights.csv", csv_of(records));
   return records;

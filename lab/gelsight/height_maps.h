@@ -1,12 +1,14 @@
 #pragma once
-// Height maps on disk, from frames on disk.
+// Height maps on disk, from frames of any source.
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "core/progress.h"
 #include "datasets/inspection/on_picture.h"
+#include "datasets/sources/frame_source.h"
 #include "sensors/heights/height_estimator.h"
 
 namespace touchstone::lab {
@@ -17,7 +19,7 @@ enum class HeightFormat {
   png16  ///< 16 bit grey: level 10000 is 0 mm, a level is 0.1 um: -1 to 5.55 mm
 };
 
-/// Writes a height map (CV_32FC1, mm) beside `file`: the same name with .exr or .png.
+/// Writes a height map (CV_32FC1, mm) beside `file`: the same name with .exr or .png. Makes its folder if need be.
 void write_height_map(const cv::Mat& height_mm, std::filesystem::path file, HeightFormat format);
 
 /// A line of the summary.
@@ -43,13 +45,18 @@ std::vector<std::string> faults_of(const std::vector<Record>& records) {
   return faults;
 }
 
-/// Estimates each frame and writes FOLDER/STEM.exr or .png, and FOLDER/heights.csv when all are done. The folder
-/// is made if it isn't there. A frame that can't be read or estimated has a record with its fault, and no map.
-/// @pre no two frames have one stem (datasets::picture_files)
+/// Estimates each frame of each stream and writes FOLDER/STEM.exr or .png (of several streams FOLDER/SEQUENCE/STEM),
+/// and FOLDER/heights.csv when all are done. Folders are made if they aren't there. A frame that can't be read or
+/// estimated has a record with its fault, and no map.
+/// @param show shown each frame with its result; may be empty
 /// @throws Error if there is a fault in each of them
-std::vector<HeightRecord> write_height_maps(const sensors::HeightModel& model, const sensors::HeightSettings& settings,
-                                            const std::vector<std::filesystem::path>& frames,
-                                            const std::filesystem::path& folder, HeightFormat format,
-                                            const Progress& progress = {});
+std::vector<HeightRecord> write_height_maps(
+    const sensors::HeightModel& model, const sensors::HeightSettings& settings,
+    const std::vector<datasets::FrameStream>& streams, const std::filesystem::path& folder, HeightFormat format,
+    const Progress& progress = {},
+    const std::function<void(const cv::Mat& frame, const sensors::HeightResult& result)>& show = {});
+
+/// What a table of frames calls one of them: the file's name, with its sequence before it where there are several.
+std::string name_in_table(const datasets::SourceFrame& frame);
 
 }  // namespace touchstone::lab

@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
+#include <utility>
 
 #include "core/error.h"
 #include "core/natural_order.h"
 #include "datasets/inspection/on_picture.h"
-#include "datasets/sets/frame_sequence.h"
+#include "lab/gelsight/height_maps.h"
 #include "sim/files/image_file.h"
 
 namespace touchstone::lab {
@@ -29,8 +30,8 @@ cv::Mat heights_of(const fs::path& file) {
 
 }  // namespace
 
-HeightSource::HeightSource(const sensors::HeightModel& model, const fs::path& frames)
-    : files_(datasets::picture_files(frames)), mm_per_px_(model.mm_per_px) {
+HeightSource::HeightSource(const sensors::HeightModel& model, std::vector<datasets::FrameStream> streams)
+    : streams_(std::move(streams)), mm_per_px_(model.mm_per_px) {
   estimator_.emplace(model, sensors::HeightSettings{.border = sensors::HeightBorder::free});
 }
 
@@ -46,16 +47,47 @@ HeightSource::HeightSource(const fs::path& maps, double mm_per_px) : mm_per_px_(
   std::ranges::sort(files_, [](const fs::path& a, const fs::path& b) { return natural_less(a.string(), b.string()); });
 }
 
+std::int64_t HeightSource::maps() const {
+  return estimator_ ? datasets::frames_of(streams_) : static_cast<std::int64_t>(files_.size());
+}
+
+cv::Mat HeightSource::estimated(const cv::Mat& frame) {
+  const sensors::HeightResult& result = estimator_->estimate(frame);
+  if (!result.trusted()) fail("is {}", result.overexposed ? "overexposed" : result.dark ? "dark" : "of one colour");
+  if (!cv::checkRange(result.height_mm)) fail("has heights that aren't finite");
+  return result.height_mm;
+}
+
+bool HeightSource::next(SourceHeights& map) {
+  map = {};
+  if (!estimator_) {
+    if (next_ == files_.size()) return false;
+    const fs::path& file = files_[next_++];
+    map.file = file.filename().string();
+    map.title = file.string();
+    map.fault = datasets::fault_in([&] { map.height_mm = read(file); });
+    return true;
+  }
+  for (;;) {
+    if (!open_) {
+      if (next_ == streams_.size()) return false;
+      open_ = streams_[next_++].open();
+    }
+    datasets::SourceFrame frame;
+    if (open_->next(frame)) {
+      map.file = name_in_table(frame);
+      map.title = frame.title;
+      map.fault = datasets::fault_on_frame(frame, [&](const cv::Mat& image) { map.height_mm = estimated(image); });
+      return true;
+    }
+    open_.reset();
+  }
+}
+
 cv::Mat HeightSource::read(const fs::path& file) {
   cv::Mat heights;
   datasets::naming(file, [&] {
-    if (!estimator_) {
-      heights = heights_of(file);
-    } else {
-      const sensors::HeightResult& result = estimator_->estimate(sim::read_image(file));
-      if (!result.trusted()) fail("is {}", result.overexposed ? "overexposed" : result.dark ? "dark" : "of one colour");
-      heights = result.height_mm;
-    }
+    heights = estimator_ ? estimated(sim::read_image(file)) : heights_of(file);
     if (!cv::checkRange(heights)) fail("has heights that aren't finite");
   });
   return heights;

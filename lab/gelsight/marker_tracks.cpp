@@ -4,12 +4,12 @@
 
 #include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <utility>
 
 #include "core/error.h"
-#include "core/whole_file.h"
-#include "datasets/inspection/on_picture.h"
+#include "core/whole_file_writer.h"
 #include "datasets/sets/csv_cells.h"
 #include "sensors/markers/marker_overlay.h"
 #include "sim/files/image_file.h"
@@ -22,10 +22,10 @@ namespace fs = std::filesystem;
 constexpr const char* kHeader = "sequence,frame,file,t_us,marker,x_px,y_px,dx_px,dy_px,trusted,status\n";
 
 /// What all lines of a frame begin with.
-std::string line_start(const std::string& sequence, const datasets::LabelledFrame& frame, bool times_known) {
+std::string line_start(const std::string& sequence, const datasets::LabelledFrame& frame) {
   return fmt::format("{},{},{},{},", datasets::csv_cell(sequence), frame.frame,
                      datasets::csv_cell(frame.file.filename().string()),
-                     times_known ? fmt::format("{}", frame.t_us) : std::string());
+                     frame.timed ? fmt::format("{}", frame.t_us) : std::string());
 }
 
 /// The line of a frame that can't be used.
@@ -45,16 +45,14 @@ void add_markers(const std::string& start, const sensors::TrackedMarkers& marker
 /// Follows one sequence's markers, and reads touches if they are wanted.
 class Follower {
  public:
-  /// Has seen the gel at rest. @throws Error naming the picture
-  Follower(const fs::path& rest, const std::optional<sensors::TouchCalibration>& touch) {
-    datasets::on_picture(rest, [&](const cv::Mat& image) {
-      if (touch) {
-        reader_.emplace(sensors::at_rest(*touch, image));
-      } else {
-        tracker_.emplace(sensors::MarkerTrackerSettings{});
-        tracker_->track({image, std::numeric_limits<std::int64_t>::min()});  // before any frame, whatever their clock
-      }
-    });
+  /// Has seen the gel at rest. @throws Error for a picture that doesn't show it
+  Follower(const cv::Mat& rest, const std::optional<sensors::TouchCalibration>& touch) {
+    if (touch) {
+      reader_.emplace(sensors::at_rest(*touch, rest));
+    } else {
+      tracker_.emplace(sensors::MarkerTrackerSettings{});
+      tracker_->track({rest, std::numeric_limits<std::int64_t>::min()});  // before any frame, whatever their clock
+    }
   }
 
   /// None if touches aren't read. @throws Error for a frame that can't be taken
@@ -72,104 +70,166 @@ class Follower {
 };
 
 /// What is written of all sequences.
-struct Tables {
-  std::string markers = kHeader;
-  std::string touches = touch_header();
+class Tables {
+ public:
+  Tables(const fs::path& folder, bool touch) : markers_(folder / "markers.csv") {
+    markers_.append(kHeader);
+    if (!touch) return;
+    touches_.emplace(folder / "touch.csv");
+    touches_->append(touch_header());
+  }
+  void add(const std::string& markers, const std::string& touch) {
+    markers_.append(markers);
+    if (touches_) touches_->append(touch);
+  }
+  void add_fault(const std::string& start, const std::string& fault) {
+    add(marker_fault_line(start, fault), touch_fault_line(start, fault));
+  }
+  void finish() {
+    markers_.finish();
+    if (touches_) touches_->finish();
+  }
+
+ private:
+  WholeFileWriter markers_;
+  std::optional<WholeFileWriter> touches_;
 };
 
-/// @param follower has seen the gel at rest
-MarkerTrack follow(const datasets::FrameSequence& sequence, Follower& follower, const MarkerTrackSettings& settings,
+/// A sequence that has been opened.
+struct Opened {
+  std::unique_ptr<datasets::FrameSource> source;
+  std::optional<datasets::SourceFrame> first;  ///< if it has been taken from the source
+  std::unique_ptr<Follower> follower;          ///< has seen the gel at rest
+  std::string refused = {};                    ///< why there's no follower
+};
+
+/// Opens a sequence and shows its gel at rest to a follower, as far as that can be done.
+Opened opened(const datasets::FrameStream& stream, const MarkerTrackSettings& settings) {
+  Opened one;
+  one.source = stream.open();
+  if (settings.rest.empty() && !stream.rest) {
+    one.first.emplace();
+    if (!one.source->next(*one.first)) fail("{}: has no frame", stream.name);
+  }
+  std::string name = settings.rest.string();
+  try {
+    cv::Mat rest;
+    if (!settings.rest.empty()) {
+      rest = sim::read_image(settings.rest);
+    } else if (stream.rest) {
+      name = stream.name + ": its background";
+      rest = stream.rest();
+    } else {
+      name = one.first->title;
+      if (!one.first->fault.empty()) fail("{}", one.first->fault);
+      rest = one.first->image;
+    }
+    one.follower = std::make_unique<Follower>(rest, settings.touch);
+  } catch (const Error& error) {
+    const std::string message = error.what();
+    const bool named = name.empty() || message.find(name) != std::string::npos;
+    one.refused = fmt::format("{}{}{} (this is the frame at rest; --rest names another)", named ? "" : name,
+                              named ? "" : ": ", message);
+  }
+  return one;
+}
+
+/// @param one whose follower has seen the gel at rest
+MarkerTrack follow(const datasets::FrameStream& stream, Opened& one, const MarkerTrackSettings& settings,
                    const fs::path& overlays, Tables& tables, const std::function<void()>& frame_done) {
   MarkerTrack track;
-  track.sequence = sequence.name;
+  track.sequence = stream.name;
+  Follower& follower = *one.follower;
   track.appearance = follower.tracker().appearance().value();
   track.appearance.spacing_px = follower.tracker().spacing_px();  // between centres, where learning is good to pixels
   track.markers = static_cast<int>(follower.markers().rest.size());
   cv::Mat picture;
-  for (const datasets::LabelledFrame& frame : sequence.frames) {
-    const std::string start = line_start(sequence.name, frame, settings.times_known);
-    std::string fault = datasets::fault_on_picture(frame.file, [&](const cv::Mat& image) {
-      const sensors::TouchReading* touch = follower.read({image, frame.t_us});
+  const auto read = [&](const datasets::SourceFrame& frame) {
+    const datasets::LabelledFrame& label = frame.label;
+    const std::string start = line_start(stream.name, label);
+    std::string lines, touch_text;
+    std::string fault = datasets::fault_on_frame(frame, [&](const cv::Mat& image) {
+      const sensors::TouchReading* touch = follower.read({image, label.t_us});
       const sensors::TrackedMarkers& markers = follower.markers();
-      add_markers(start, markers, tables.markers);
+      add_markers(start, markers, lines);
       if (touch != nullptr) {
-        tables.touches += touch_line(start, *touch);
-        track.touches.add(*touch, frame.force);
+        touch_text = touch_line(start, *touch);
+        track.touches.add(*touch, label.force);
       }
       ++track.frames;
       track.places += static_cast<std::int64_t>(markers.rest.size());
       for (std::size_t i = 0; i < markers.rest.size(); ++i) track.trusted += markers.trusted(i) ? 1 : 0;
-      if (markers.jumped && track.jumped_at < 0) track.jumped_at = frame.frame;
-      if (settings.overlay) {
+      if (markers.jumped && track.jumped_at < 0) track.jumped_at = label.frame;
+      if (settings.overlay || settings.show) {
         sensors::draw_overlay(image, markers, track.appearance, picture, {.arrow_scale = settings.arrow_scale});
       }
     });
     if (!fault.empty()) {
-      tables.markers += marker_fault_line(start, fault);
-      tables.touches += touch_fault_line(start, fault);
+      tables.add_fault(start, fault);
       track.faults.push_back(std::move(fault));
-    } else if (settings.overlay) {
-      sim::write_png(overlays / frame.file.filename().replace_extension(".png"), picture);
+    } else {
+      tables.add(lines, touch_text);
+      if (settings.overlay) sim::write_png(overlays / (frame.stem + ".png"), picture);
+      if (settings.show) settings.show(picture);
     }
     frame_done();
-  }
+  };
+  if (one.first) read(*one.first);
+  for (datasets::SourceFrame frame; one.source->next(frame);) read(frame);
   return track;
 }
 
 }  // namespace
 
-std::vector<MarkerTrack> write_marker_tracks(const std::vector<datasets::FrameSequence>& sequences,
+std::vector<MarkerTrack> write_marker_tracks(const std::vector<datasets::FrameStream>& streams,
                                              const MarkerTrackSettings& settings, const fs::path& folder,
                                              const Progress& progress) {
-  std::int64_t total = 0, done = 0;
-  for (const datasets::FrameSequence& sequence : sequences) total += std::ssize(sequence.frames);
+  const std::int64_t total = datasets::frames_of(streams);
+  std::int64_t done = 0;
   const auto frame_done = [&] {
     ++done;
     if (progress) progress("markers", done, total);
   };
-  const auto rest_of = [&](const datasets::FrameSequence& sequence) {
-    return settings.rest.empty() ? sequence.frames.front().file : settings.rest;
-  };
   // All frames at rest come before anything is written. What is made of them isn't kept: of many sequences it's large.
   std::vector<std::string> refused;
-  for (const datasets::FrameSequence& sequence : sequences) {
-    refused.emplace_back();
-    try {
-      const Follower follower(rest_of(sequence), settings.touch);
-    } catch (const Error& error) {
-      refused.back() = fmt::format("{} (this is the frame at rest; --rest names another)", error.what());
-      if (sequences.size() == 1 || !settings.rest.empty()) fail("{}", refused.back());
-    }
+  Opened only;
+  for (const datasets::FrameStream& stream : streams) {
+    Opened one = opened(stream, settings);
+    if (!one.refused.empty() && (streams.size() == 1 || !settings.rest.empty())) fail("{}", one.refused);
+    refused.push_back(one.refused);
+    if (streams.size() == 1) only = std::move(one);
   }
   fs::create_directories(folder);
   std::vector<MarkerTrack> tracks;
   std::vector<std::string> faults;
-  Tables tables;
-  for (std::size_t i = 0; i < sequences.size(); ++i) {
-    const datasets::FrameSequence& sequence = sequences[i];
-    const fs::path overlays = folder / "overlay" / (sequences.size() > 1 ? sequence.name : "");
+  Tables tables(folder, settings.touch.has_value());
+  for (std::size_t i = 0; i < streams.size(); ++i) {
+    const datasets::FrameStream& stream = streams[i];
+    const fs::path overlays = folder / "overlay";
     if (refused[i].empty()) {
-      if (settings.overlay) fs::create_directories(overlays);
-      Follower follower(rest_of(sequence), settings.touch);
-      tracks.push_back(follow(sequence, follower, settings, overlays, tables, frame_done));
+      if (settings.overlay) fs::create_directories(streams.size() > 1 ? overlays / stream.name : overlays);
+      Opened again = streams.size() == 1 ? std::move(only) : opened(stream, settings);
+      tracks.push_back(follow(stream, again, settings, overlays, tables, frame_done));
     } else {
-      const std::string start = line_start(sequence.name, sequence.frames.front(), settings.times_known);
-      tables.markers += marker_fault_line(start, refused[i]);
-      tables.touches += touch_fault_line(start, refused[i]);
+      datasets::SourceFrame first;
+      stream.open()->next(first);
+      tables.add_fault(line_start(stream.name, first.label), refused[i]);
       MarkerTrack none;
-      none.sequence = sequence.name;
+      none.sequence = stream.name;
       none.faults.push_back(refused[i]);
       tracks.push_back(std::move(none));
-      done += std::ssize(sequence.frames);
+      done += stream.frames.value_or(0);
     }
     const MarkerTrack& track = tracks.back();
     if (track.frames == 0) faults.insert(faults.end(), track.faults.begin(), track.faults.end());
   }
   std::size_t without_frames = 0;
   for (const MarkerTrack& track : tracks) without_frames += track.frames == 0 ? 1U : 0U;
-  if (without_frames == tracks.size()) fail("none of {} frames can be used; the first: {}", total, faults.front());
-  write_whole_file(folder / "markers.csv", tables.markers);
-  if (settings.touch) write_whole_file(folder / "touch.csv", tables.touches);
+  if (without_frames == tracks.size()) {
+    fail("none of {} frames can be used{}{}", done,
+         faults.empty() ? "" : "; the first: ", faults.empty() ? "" : faults.front());
+  }
+  tables.finish();
   return tracks;
 }
 

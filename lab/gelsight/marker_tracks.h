@@ -3,12 +3,14 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <opencv2/core/mat.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "core/progress.h"
-#include "datasets/sets/frame_sequence.h"
+#include "datasets/sources/frame_source.h"
 #include "lab/gelsight/touch_lines.h"
 #include "sensors/markers/marker_tracker.h"
 
@@ -16,10 +18,10 @@ namespace touchstone::lab {
 
 /// How tracks are made and written.
 struct MarkerTrackSettings {
-  std::filesystem::path rest = {};  ///< a picture of the gel untouched; empty: each sequence's first frame is one
-  bool times_known = true;          ///< else frames are only in order, and cells of time are empty
-  bool overlay = false;             ///< a picture of each frame with its markers' arrows, too
-  double arrow_scale = 1.0;         ///< of these (sensors/markers/marker_overlay.h)
+  /// A picture of the gel untouched; empty: the stream's own, or where it has none, each sequence's first frame.
+  std::filesystem::path rest = {};
+  bool overlay = false;      ///< a picture of each frame with its markers' arrows, too
+  double arrow_scale = 1.0;  ///< of these (sensors/markers/marker_overlay.h)
   /// If there, contact, slip and what else is known of the gel (forces, heights) is read, too; without a background,
   /// which each sequence has of its own.
   std::optional<sensors::TouchCalibration> touch = {};
@@ -41,11 +43,10 @@ struct MarkerTrack {
 /// for each marker of each frame; if asked for FOLDER/touch.csv, a line for each frame, and FOLDER/overlay/STEM.png, of
 /// several sequences FOLDER/overlay/SEQUENCE/STEM.png. The folder is made if it isn't there. A frame that can't be read
 /// or is of another size has one line that says so. So has a sequence whose frame at rest can't be used, unless it's
-/// the only one.
+/// the only one. Tables are written as frames come, so that they take no memory.
 /// @throws Error naming the picture if the frame at rest can't be used (of all sequences, if there are several), or if
-/// no
-///   frame can be
-std::vector<MarkerTrack> write_marker_tracks(const std::vector<datasets::FrameSequence>& sequences,
+///   no frame can be
+std::vector<MarkerTrack> write_marker_tracks(const std::vector<datasets::FrameStream>& streams,
                                              const MarkerTrackSettings& settings, const std::filesystem::path& folder,
                                              const Progress& progress = {});
 

@@ -30,32 +30,30 @@ sensors::PlaceMap read_place_map(const fs::path& csv, const cv::Size& size) {
 
 PlaceReader::PlaceReader(HeightSource& source, fs::path marks) : source_(source), marks_(std::move(marks)) {}
 
-sensors::TouchImage PlaceReader::touch_of(const fs::path& file) {
-  const cv::Mat heights = source_.read(file);
+sensors::TouchImage PlaceReader::touch_of(const cv::Mat& heights) const {
   const cv::Mat contact = sensors::higher_part(heights);
-  if (marks_.empty()) return {heights.clone(), contact, source_.mm_per_px()};
-  if (!places_) places_ = read_place_map(marks_, heights.size());
-  sensors::TouchImage touch;
-  datasets::naming(file, [&] { touch = sensors::rectified(heights, contact, *places_); });
-  return touch;
+  return places_ ? sensors::rectified(heights, contact, *places_)
+                 : sensors::TouchImage{heights.clone(), contact, source_.mm_per_px()};
 }
 
 template <typename Register>
 std::vector<PlaceRecord> PlaceReader::for_touches(const Register& with, const Progress& progress) {
-  // A table of marks that can't be used is no fault of a frame.
-  if (!marks_.empty() && !places_) places_ = read_place_map(marks_, source_.read(source_.files().front()).size());
   std::vector<PlaceRecord> records;
   std::vector<std::string> faults;
-  for (const fs::path& file : source_.files()) {
+  const std::int64_t total = source_.maps();
+  for (SourceHeights map; source_.next(map);) {
     PlaceRecord record;
-    record.file = file.filename().string();
-    record.fault = datasets::fault_in([&] {
-      const sensors::TouchImage touch = touch_of(file);
-      datasets::naming(file, [&] { record.found = with(touch); });
-    });
+    record.file = map.file;
+    record.fault = map.fault;
+    if (map.fault.empty()) {
+      // A table of marks that can't be used is no fault of a frame.
+      if (!marks_.empty() && !places_) places_ = read_place_map(marks_, map.height_mm.size());
+      record.fault = datasets::fault_in(
+          [&] { datasets::naming(map.title, [&] { record.found = with(touch_of(map.height_mm)); }); });
+    }
     if (!record.fault.empty()) faults.push_back(record.fault);
     records.push_back(std::move(record));
-    if (progress) progress("places", std::ssize(records), std::ssize(source_.files()));
+    if (progress) progress("places", std::ssize(records), total);
   }
   datasets::require_a_frame(faults, records.size());
   return records;

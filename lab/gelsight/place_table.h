@@ -25,7 +25,7 @@ struct PlaceRecord {
   std::string fault = {};  ///< why it couldn't be tried
 };
 
-/// Registers the source's files, in their order, with a map.
+/// Registers the source's height maps, in their order, with a map.
 class PlaceReader {
  public:
   /// @param marks as of read_place_map; empty: pixels lie on a straight grid
@@ -42,7 +42,7 @@ class PlaceReader {
  private:
   template <typename Register>
   std::vector<PlaceRecord> for_touches(const Register& with, const Progress& progress);
-  sensors::TouchImage touch_of(const std::filesystem::path& file);
+  sensors::TouchImage touch_of(const cv::Mat& heights) const;
 
   HeightSource& source_;
   std::filesystem::path marks_;

@@ -102,20 +102,21 @@ std::vector<TextureRecord> write_materials(const sensors::TextureModel& model, H
   std::vector<TextureRecord> records;
   std::vector<std::string> faults;
   std::string table = "file,material,squares,agreeing,distance,fault\n";
-  for (const fs::path& file : source.files()) {
+  const std::int64_t total = source.maps();
+  for (SourceHeights map; source.next(map);) {
     TextureRecord record;
-    record.file = file.filename().string();
-    record.fault = datasets::fault_in([&] {
-      const cv::Mat heights = source.read(file);
-      datasets::naming(file, [&] {
+    record.file = map.file;
+    record.fault = map.fault.empty() ? datasets::fault_in([&] {
+      datasets::naming(map.title, [&] {
         std::vector<sensors::TextureMatch> matches;
-        for (const cv::Mat& square : sensors::squares_of(heights, square_px)) {
+        for (const cv::Mat& square : sensors::squares_of(map.height_mm, square_px)) {
           matches.push_back(sensors::classify_texture(model, square, source.mm_per_px()));
         }
         record.vote = sensors::vote(matches);
         record.material = model.classes[static_cast<std::size_t>(record.vote.label)];
       });
-    });
+    })
+                                     : map.fault;
     if (record.fault.empty()) {
       table +=
           fmt::format("{},{},{},{},{:.4f},\n", datasets::csv_cell(record.file), datasets::csv_cell(record.material),
@@ -125,7 +126,7 @@ std::vector<TextureRecord> write_materials(const sensors::TextureModel& model, H
       faults.push_back(record.fault);
     }
     records.push_back(std::move(record));
-    if (progress) progress("textures", std::ssize(records), std::ssize(source.files()));
+    if (progress) progress("textures", std::ssize(records), total);
   }
   datasets::require_a_frame(faults, records.size());
   write_whole_file(csv, table);

@@ -42,7 +42,7 @@ struct TextureRecord {
   std::string fault = {};
 };
 
-/// Names the material of each of the source's files and writes `csv`: `file,material,squares,agreeing,distance,fault`.
+/// Names the material of each of the source's maps and writes `csv`: `file,material,squares,agreeing,distance,fault`.
 /// @throws Error if no file can be used, or for a source whose pixels have another size than the model's
 std::vector<TextureRecord> write_materials(const sensors::TextureModel& model, HeightSource& source, int square_px,
                                            const std::filesystem::path& csv, const Progress& progress = {});

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/progress.h"
-#include "datasets/sets/frame_sequence.h"
+#include "datasets/sources/frame_source.h"
 #include "sensors/markers/touch_forces.h"
 
 namespace touchstone::lab {
@@ -21,9 +21,9 @@ struct TouchForceCalibration {
 
 /// Reads the markers of each sequence, which is a series, from its frame at rest on, and fits the lines.
 /// @param parts what else is known of the gel: heights, mm_per_px; lines aren't looked at
-/// @param rest a picture of the gel untouched; empty: each sequence's first frame is one
+/// @param rest a picture of the gel untouched; empty: the stream's own, or where it has none, its first frame
 /// @throws Error naming the frame whose force isn't known, or the picture at rest that can't be used; as fit_gel_forces
-TouchForceCalibration calibrate_touch_forces(const std::vector<datasets::FrameSequence>& sequences,
+TouchForceCalibration calibrate_touch_forces(const std::vector<datasets::FrameStream>& streams,
                                              const sensors::TouchCalibration& parts, const std::filesystem::path& rest,
                                              const std::string& gel, const std::string& indenter,
                                              const Progress& progress = {});

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string>
 
-#include "datasets/sets/frame_sequence.h"
+#include "datasets/sources/frame_sequence.h"
 #include "sensors/markers/touch_reader.h"
 
 namespace touchstone::lab {

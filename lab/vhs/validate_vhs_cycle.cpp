@@ -42,7 +42,7 @@ std::vector<ValidationRow> validate_vhs_cycle(const ValidateOptions& options) {
   double lost = 0.0;
   const auto tracked = [&](datasets::Split split) {
     std::vector<TrackedSequence> sequences =
-        track(datasets::frames_of_data_set(data, split), tracker, options.progress);
+        track(datasets::picture_streams(datasets::frames_of_data_set(data, split)), tracker, options.progress);
     for (const TrackedSequence& sequence : sequences) lost += static_cast<double>(sequence.lost());
     return sequences;
   };

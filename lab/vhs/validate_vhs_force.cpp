@@ -58,7 +58,8 @@ Trial evaluate(const std::filesystem::path& data, const Progress& progress) {
   const sensors::BeadTrackerSettings tracker;
   Trial trial;
   const auto tracked = [&](datasets::Split split) {
-    std::vector<TrackedSequence> sequences = track(datasets::frames_of_data_set(data, split), tracker, progress);
+    std::vector<TrackedSequence> sequences =
+        track(datasets::picture_streams(datasets::frames_of_data_set(data, split)), tracker, progress);
     for (const TrackedSequence& sequence : sequences) trial.lost += static_cast<double>(sequence.lost());
     return sequences;
   };

@@ -29,7 +29,7 @@ std::vector<ValidationRow> validate_vhs_vibration(const ValidateOptions& options
   datasets::generate(options.scenes / "jobs" / "vhs-vibration.yaml", data, how, options.progress);
   const sensors::BeadTrackerSettings tracker;
   const auto tracked = [&](datasets::Split split) {
-    return track(datasets::frames_of_data_set(data, split), tracker, options.progress);
+    return track(datasets::picture_streams(datasets::frames_of_data_set(data, split)), tracker, options.progress);
   };
   const sensors::StiffnessForceModel model =
       sensors::train(training_samples(tracked(datasets::Split::train), tracker.grid),

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cmath>
 #include <map>
+#include <mutex>
 
 #include "core/dense_solvers.h"
 #include "core/error.h"
@@ -51,30 +52,39 @@ void require_first(const TrackedSequence& sequence) {
        sequence.faults.front());
 }
 
-std::vector<TrackedSequence> track(const std::vector<datasets::FrameSequence>& sequences,
-                                   const sensors::BeadTrackerSettings& settings, const Progress& progress) {
-  std::int64_t total = 0;
-  for (const datasets::FrameSequence& sequence : sequences) total += static_cast<std::int64_t>(sequence.frames.size());
+std::vector<TrackedSequence> track(
+    const std::vector<datasets::FrameStream>& streams, const sensors::BeadTrackerSettings& settings,
+    const Progress& progress,
+    const std::function<void(const cv::Mat& frame, const sensors::TrackedBeads& beads)>& show) {
+  const std::int64_t total = datasets::frames_of(streams);
   std::atomic<std::int64_t> done{0};
-  std::vector<TrackedSequence> tracked(sequences.size());
-  tbb::parallel_for(std::size_t{0}, sequences.size(), [&](std::size_t i) {
+  std::vector<TrackedSequence> tracked(streams.size());
+  std::mutex showing;
+  tbb::parallel_for(std::size_t{0}, streams.size(), [&](std::size_t i) {
     TrackedSequence& to = tracked[i];
-    to.source.name = sequences[i].name;
+    to.source.name = streams[i].name;
     sensors::BeadTracker tracker(settings);
-    for (const datasets::LabelledFrame& frame : sequences[i].frames) {
-      std::string fault = datasets::fault_on_picture(frame.file, [&](const cv::Mat& image) {
-        to.beads.push_back(tracker.track({image, frame.t_us}));
+    const std::unique_ptr<datasets::FrameSource> source = streams[i].open();
+    std::size_t frames = 0;
+    for (datasets::SourceFrame frame; source->next(frame); ++frames) {
+      std::string fault = datasets::fault_on_frame(frame, [&](const cv::Mat& image) {
+        to.beads.push_back(tracker.track({image, frame.label.t_us}));
       });
       if (fault.empty()) {
-        to.source.frames.push_back(frame);
+        to.source.frames.push_back(frame.label);
+        if (show) {
+          const std::lock_guard<std::mutex> lock(showing);
+          show(frame.image, to.beads.back());
+        }
       } else {
-        to.without_first = to.without_first || &frame == &sequences[i].frames.front();
+        to.without_first = to.without_first || frames == 0;
         to.faults.push_back(std::move(fault));
       }
       const std::int64_t now = ++done;
       if (progress) progress("tracking", now, total);
     }
-    datasets::require_a_frame(to.faults, sequences[i].frames.size());
+    datasets::require_a_frame(to.faults, frames);
+    if (frames == 0) fail("{}: has no frame", to.source.name);
   });
   return tracked;
 }

@@ -4,13 +4,15 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <functional>
+#include <opencv2/core/mat.hpp>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "core/progress.h"
-#include "datasets/sets/frame_sequence.h"
+#include "datasets/sources/frame_source.h"
 #include "lab/statistics/straight_line.h"
 #include "sensors/beads/bead_tracker.h"
 #include "sensors/beads/stiffness_force_model.h"
@@ -36,8 +38,11 @@ void require_first(const TrackedSequence& sequence);
 
 /// Follows the beads through each sequence, from its first frame on. Sequences run in parallel. A frame that can't be
 /// read or tracked is left out of its sequence. @throws Error if all frames of a sequence are
-std::vector<TrackedSequence> track(const std::vector<datasets::FrameSequence>& sequences,
-                                   const sensors::BeadTrackerSettings& settings, const Progress& progress = {});
+/// @param show shown each frame with its beads, by one sequence at a time; may be empty
+std::vector<TrackedSequence> track(
+    const std::vector<datasets::FrameStream>& streams, const sensors::BeadTrackerSettings& settings,
+    const Progress& progress = {},
+    const std::function<void(const cv::Mat& frame, const sensors::TrackedBeads& beads)>& show = {});
 
 /// Training samples of tracked sequences. The rest positions are the mean over the sequences' first frames; frames in
 /// which a bead wasn't measured are left out.

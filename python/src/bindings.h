@@ -13,6 +13,7 @@ SharedObject object_for(const Sensor& sensor, const py::handle& value);
 
 void bind_errors(py::module_& module);
 void bind_files(py::module_& module);
+void bind_frames(py::module_& module);
 void bind_sensor(py::module_& module);
 void bind_session(py::module_& module);
 void bind_gelsight(py::module_& module);

@@ -14,6 +14,7 @@ PYBIND11_MODULE(_core, module) {
   module.def("vector_instructions", &datasets::vector_instructions, "'avx512', 'avx2' or 'baseline'.");
   python::bind_errors(module);
   python::bind_files(module);
+  python::bind_frames(module);
   python::bind_sensor(module);
   python::bind_session(module);
   python::bind_gelsight(module);

@@ -63,6 +63,7 @@ from ._core import (
     calibrate_height,
     calibrate_hue,
     fit_touch_forces,
+    frames,
     read_events,
     read_image,
     scenes_folder,
@@ -127,6 +128,6 @@ __all__ = [
     "HeightEstimator", "HeightModel", "HeightResult", "HueEstimator", "HueField", "HueModel", "MarkerTracker", "Object",
     "Reading", "Registration", "Sensor", "Session", "StiffnessForceModel", "TactileMap", "TextureMatch", "TextureModel",
     "Touch", "TouchReader", "TouchReading", "TrackedBeads", "TrackedMarkers", "calibrate_darkness", "calibrate_height",
-    "calibrate_hue", "fit_touch_forces", "generate", "merge", "read_events", "read_image", "scenes_folder",
+    "calibrate_hue", "fit_touch_forces", "frames", "generate", "merge", "read_events", "read_image", "scenes_folder",
     "train_stiffness", "write_png",
 ]

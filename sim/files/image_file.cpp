@@ -1,14 +1,11 @@
 #include "sim/files/image_file.h"
 
-#include <dlfcn.h>
-
-#include <algorithm>
 #include <array>
 #include <opencv2/imgproc.hpp>
 #include <set>
 
 #include "core/error.h"
-#include "core/installed_copy.h"
+#include "core/own_module.h"
 #include "core/whole_file.h"
 #include "sim/files/image_module.h"
 
@@ -17,43 +14,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Where the module may be: beside the file that this code is in, as in a folder that was moved; where Touchstone is
-// installed; where it was built.
-std::vector<fs::path> module_places() {
-  const fs::path name = TOUCHSTONE_IMAGE_MODULE_NAME;
-  std::vector<fs::path> places;
-  std::error_code unknown;
-  const fs::path own = fs::canonical(own_file(), unknown).parent_path();
-  if (!unknown) places = {own / name, own / "touchstone" / name};
-  for (const fs::path& folder : installed_module_folders()) places.push_back(folder / name);
-  places.push_back(TOUCHSTONE_IMAGE_MODULE_BUILT);
-  return places;
-}
-
-const TouchstoneImageModule& load_module() {
-  const std::vector<fs::path> places = module_places();
-  std::error_code ignored;
-  const auto found =
-      std::find_if(places.begin(), places.end(), [&](const fs::path& p) { return fs::exists(p, ignored); });
-  if (found == places.end()) {
-    std::string all;
-    for (const fs::path& place : places) all += (all.empty() ? "" : ", ") + place.string();
-    fail("the module for image files is missing; it was looked for as {}", all);
-  }
-  // It stays open to the end of the process: OpenImageIO starts threads that can't be taken back.
-  void* const module = dlopen(found->c_str(), RTLD_NOW | RTLD_LOCAL);
-  if (module == nullptr) fail("{}: the module for image files can't be loaded ({})", found->string(), dlerror());
-  using Table = const TouchstoneImageModule* (*)();
-  const auto table = reinterpret_cast<Table>(dlsym(module, kTouchstoneImageModuleSymbol));
-  if (table == nullptr || table()->version != kTouchstoneImageModuleVersion) {
-    fail("{}: the module for image files belongs to another version of Touchstone", found->string());
-  }
-  return *table();
-}
-
 // Loaded once; if that fails, the next call tries again.
 const TouchstoneImageModule& image_module() {
-  static const TouchstoneImageModule& module = load_module();
+  static const TouchstoneImageModule& module =
+      own_module_table<TouchstoneImageModule>({.name = TOUCHSTONE_IMAGE_MODULE_NAME,
+                                               .built = TOUCHSTONE_IMAGE_MODULE_BUILT,
+                                               .purpose = "image files",
+                                               .symbol = kTouchstoneImageModuleSymbol},
+                                              kTouchstoneImageModuleVersion);
   return module;
 }
 

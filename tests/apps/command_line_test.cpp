@@ -214,10 +214,10 @@ TEST(CommandLine, MistakesOnTheLineItself) {
   expect_refused(run_program({"--threads", "0", "plan", "a.yaml"}), "--threads");
   expect_refused(run_program({"plan", "/nonexistent.yaml"}), "/nonexistent.yaml");
   expect_refused(run_program({"validate", "mecanics"}), "mecanics");
-  expect_refused(run_program({"calibrate", "vhx", "--data", ".", "-o", "m.json"}), "did you mean 'vhs'?");
-  expect_refused(run_program({"calibrate", "vhs", "-o", "m.json"}), "--data");
-  expect_refused(run_program({"estimate", "vhs", "--model", "/none.json", "--data", "."}), "/none.json");
-  expect_refused(run_program({"estimate", "vhs", "--model", "m.json", "--data", ".", "--compliance", "c"}),
+  expect_refused(run_program({"calibrate", "vhx", "--frames", ".", "-o", "m.json"}), "did you mean 'vhs'?");
+  expect_refused(run_program({"calibrate", "vhs", "-o", "m.json"}), "--frames");
+  expect_refused(run_program({"estimate", "vhs", "--model", "/none.json", "--frames", "."}), "/none.json");
+  expect_refused(run_program({"estimate", "vhs", "--model", "m.json", "--frames", ".", "--compliance", "c"}),
                  "--distribution");
   expect_refused(run_program({"inspect", "/nonexistent", "-o", "sheet.png"}), "isn't a data set");
 }

@@ -62,8 +62,7 @@ class MarkersCommand : public ::testing::Test {
 };
 
 TEST_F(MarkersCommand, FramesGiveDisplacementsAndPictures) {
-  const auto run =
-      run_program({"estimate", "markers", in("frames"), "-o", in("out"), "--overlay", "--frame-rate", "25"});
+  const auto run = run_program({"estimate", "markers", in("frames"), "-o", in("out"), "--overlay", "--rate", "25"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, AllOf(HasSubstr("markers.csv of 4 frames"), HasSubstr("frames: 99 dark markers, "),
                              HasSubstr("; 100.0 % of their places trusted")));
@@ -136,7 +135,7 @@ TEST_F(MarkersCommand, WhatCantBeUsedIsRefusedByName) {
   refused({in("frames"), "--rest", in("bare.png")}, "bare.png: markers: the frame at rest shows none");
   sim::write_png(folder_.path() / "frames/0.png", paint_markers(picture_, {{150.0, 100.0}}));
   refused({in("frames")}, "frames/0.png: markers: the frame at rest shows none");
-  refused({in("frames"), "--frame-rate", "0"}, "--frame-rate");
+  refused({in("frames"), "--rate", "0"}, "--rate");
   refused({in("frames"), "--arrow-scale", "-1"}, "--arrow-scale");
 }
 

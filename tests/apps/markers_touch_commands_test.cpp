@@ -170,7 +170,7 @@ TEST_F(TouchCommands, WhatDoesntFitTogetherIsRefusedByName) {
   calibration({"--forces", in("train.csv"), "--mm-per-px", "-1"}, "--mm-per-px");
   calibration({"--forces", in("train.csv"), "--heights", in("train.csv")}, "train.csv");
   calibration({"--forces", in("train.csv"), "--mm-per-px", "0.053", "--rest", in("none.png")}, "none.png");
-  calibration({"--forces", in("train.csv"), "--frame-rate", "25", "--mm-per-px", "0.053"}, "--frame-rate");
+  calibration({"--forces", in("train.csv"), "--rate", "25", "--mm-per-px", "0.053"}, "--rate");
   folder_.write("short.csv", "file,t_us,force_x_N,force_y_N\n0.png,0,0,0\n");
   calibration({"--forces", in("short.csv"), "--mm-per-px", "0.053"}, "short.csv:1: ");
   folder_.write("text.csv", "file,t_us,force_x_N,force_y_N,force_z_N\n0.png,0,0,0,0\n1.png,1,0,heavy,0\n");

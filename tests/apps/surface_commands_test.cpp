@@ -129,7 +129,7 @@ TEST_F(TextureCommands, WhatCantBeUsedIsRefusedByName) {
   folder_.write("blank.csv", "file,material\nlinen-0.exr,\n");
   expect_refused(with(7, in("blank.csv")), "blank.csv:2: material: is empty");
   words.erase(words.begin() + 2, words.begin() + 4);
-  expect_refused(words, "give either --frames DIR or --maps DIR");
+  expect_refused(words, "give either --frames SOURCE or --maps DIR");
 
   ASSERT_EQ(run_program(calibration("model.texture")).exit_code, 0);
   const auto estimation = [&](const std::string& model, const std::string& maps, const std::string& pitch,

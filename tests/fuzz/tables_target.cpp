@@ -3,7 +3,7 @@
 
 #include <fstream>
 
-#include "datasets/sets/frame_sequence.h"
+#include "datasets/sources/frame_sequence.h"
 #include "lab/chroma/hue_sample_table.h"
 #include "lab/gelsight/ball_press_table.h"
 #include "render/spectra/spectral_curve.h"

@@ -122,7 +122,7 @@ TEST(ForceRelations, AreThoseThatTheForcesWereMadeOf) {
 TEST(VhsExperiment, ForcesOfARecordingAreRecovered) {
   const test::TemporaryFolder folder;
   const auto csv = folder.write("forces.csv", write_recording(folder, 40));
-  const auto tracked = track({datasets::frames_of_force_table(folder.path(), csv)}, {});
+  const auto tracked = track({datasets::picture_stream(datasets::frames_of_force_table(folder.path(), csv))}, {});
   EXPECT_EQ(tracked[0].lost(), 0);
   sensors::ForceSamples samples = training_samples(tracked, 3);
   EXPECT_EQ(samples.forces.size(), 40u);
@@ -140,7 +140,7 @@ TEST(VhsExperiment, AFirstFrameWithoutBeadsIsRefused) {
     grey.at<cv::Vec3b>(1, 1) = {0, 0, 0};
     sim::write_png(folder.path() / fmt::format("{}.png", i), grey);
   }
-  const auto tracked = track({datasets::frames_of_folder(folder.path(), 30)}, {});
+  const auto tracked = track({datasets::picture_stream(datasets::frames_of_folder(folder.path()))}, {});
   try {
     training_samples(tracked, 3);
     FAIL();
@@ -171,15 +171,15 @@ TEST(ForceTable, ErrorsNameTheLine) {
   EXPECT_THAT(message_of_table(header + "a.png,0,1,2,3\na.png,0,1,2,3\n"), HasSubstr("forces.csv:3:"));
 }
 
-TEST(FramesOfFolder, AreInTheOrderOfTheirNamesAtTheRate) {
+TEST(FramesOfFolder, AreInTheOrderOfTheirNames) {
   const test::TemporaryFolder folder;
   for (const char* name : {"b.png", "a.png", "c.png", "notes.txt"}) folder.write(name, "x");
-  const datasets::FrameSequence sequence = datasets::frames_of_folder(folder.path(), 1000);
+  const datasets::FrameSequence sequence = datasets::frames_of_folder(folder.path());
   ASSERT_EQ(sequence.frames.size(), 3u);
   EXPECT_EQ(sequence.frames[1].file.filename(), "b.png");
-  EXPECT_EQ(sequence.frames[2].t_us, 2000);
-  EXPECT_THROW(datasets::frames_of_folder(folder.path(), 0), Error);
-  EXPECT_THROW(datasets::frames_of_folder(folder.path() / "none", 30), Error);
+  EXPECT_FALSE(sequence.frames[2].timed);
+  EXPECT_GT(sequence.frames[2].t_us, sequence.frames[1].t_us);
+  EXPECT_THROW(datasets::frames_of_folder(folder.path() / "none"), Error);
 }
 
 TEST(FramesOfFolder, AreInNaturalOrderWhateverTheirKinds) {
@@ -211,7 +211,7 @@ TEST(VhsExperiment, AFrameThatCantBeReadIsLeftOutAndNamed) {
   const test::TemporaryFolder folder;
   const auto csv = folder.write("forces.csv", write_recording(folder, 6));
   folder.write("frame003.png", "damaged");
-  const auto tracked = track({datasets::frames_of_force_table(folder.path(), csv)}, {});
+  const auto tracked = track({datasets::picture_stream(datasets::frames_of_force_table(folder.path(), csv))}, {});
   ASSERT_EQ(tracked[0].faults.size(), 1u);
   EXPECT_THAT(tracked[0].faults[0], HasSubstr("frame003.png: can't be read as an image"));
   ASSERT_EQ(tracked[0].source.frames.size(), 5u);
@@ -220,11 +220,12 @@ TEST(VhsExperiment, AFrameThatCantBeReadIsLeftOutAndNamed) {
   EXPECT_EQ(training_samples(tracked, 3).forces.size(), 5u);
 
   folder.write("frame000.png", "damaged");
-  const auto without_first = track({datasets::frames_of_force_table(folder.path(), csv)}, {});
+  const auto without_first = track({datasets::picture_stream(datasets::frames_of_force_table(folder.path(), csv))}, {});
   EXPECT_THAT(test::message_of([&] { training_samples(without_first, 3); }),
               HasSubstr("its first frame, which must show the beads without load, can't be used: "));
   for (int i = 0; i < 6; ++i) folder.write(fmt::format("frame{:03}.png", i), "damaged");
-  EXPECT_THAT(test::message_of([&] { track({datasets::frames_of_force_table(folder.path(), csv)}, {}); }),
+  EXPECT_THAT(test::message_of(
+                  [&] { track({datasets::picture_stream(datasets::frames_of_force_table(folder.path(), csv))}, {}); }),
               HasSubstr("none of 6 frames can be used; the first: "));
 }
 

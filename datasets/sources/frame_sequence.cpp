@@ -1,18 +1,15 @@
-#include "datasets/sets/frame_sequence.h"
+#include "datasets/sources/frame_sequence.h"
 
 #include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <cmath>
 #include <iterator>
 #include <string_view>
 
 #include "core/error.h"
 #include "core/natural_order.h"
-#include "core/units.h"
-#include "core/whole_file.h"
 #include "datasets/sets/manifest.h"
 #include "datasets/sets/truth_file.h"
 
@@ -27,6 +24,12 @@ constexpr auto kPictures = std::to_array<std::string_view>(
 /// Of pictures that would be missing among the frames. EXR and HDR aren't: height maps lie beside frames.
 constexpr auto kOtherPictures = std::to_array<std::string_view>(
     {".gif", ".heic", ".heif", ".avif", ".jp2", ".j2k", ".tga", ".psd", ".dng", ".jxl", ".pcx", ".jfif"});
+
+std::string small_ending(const fs::path& file) {
+  std::string ending = file.extension().string();
+  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  return ending;
+}
 
 }  // namespace
 
@@ -62,21 +65,26 @@ std::vector<FrameSequence> frames_of_data_set(const fs::path& folder, std::optio
   return sequences;
 }
 
+bool is_picture_name(const fs::path& file) {
+  return std::ranges::find(kPictures, small_ending(file)) != kPictures.end();
+}
+
 std::vector<fs::path> picture_files(const fs::path& folder) {
   std::error_code failed;
   if (!fs::is_directory(folder, failed)) fail("{}: isn't a folder", folder.string());
   std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(folder)) {
+  fs::directory_iterator entries(folder, failed);
+  if (failed) fail("{}: can't be read ({})", folder.string(), failed.message());
+  for (const auto& entry : entries) {
     const fs::path name = entry.path().filename();
     // Hidden ones aren't pictures: beside each 1.png that a Mac copies lies a ._1.png.
     if (name.native().starts_with('.') || entry.is_directory(failed)) continue;
-    std::string ending = name.extension().string();
-    std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
+    const std::string ending = small_ending(name);
     if (std::ranges::find(kOtherPictures, ending) != kOtherPictures.end()) {
       fail("{}: is a picture of a kind that isn't read here; allowed are {}", entry.path().string(),
            fmt::join(kPictures, ", "));
     }
-    if (std::ranges::find(kPictures, ending) != kPictures.end()) files.push_back(entry.path());
+    if (is_picture_name(name)) files.push_back(entry.path());
   }
   if (files.empty()) fail("{}: has no picture; read are {}", folder.string(), fmt::join(kPictures, ", "));
   // By the stem first: "a.png" stands before "a-1.png" though a hyphen comes before a dot.
@@ -92,14 +100,16 @@ std::vector<fs::path> picture_files(const fs::path& folder) {
   return files;
 }
 
-FrameSequence frames_of_folder(const fs::path& folder, double frame_rate_Hz) {
-  if (!(frame_rate_Hz > 0.0) || !std::isfinite(frame_rate_Hz)) fail("frame rate {}: must be above 0", frame_rate_Hz);
+FrameSequence frames_of_folder(const fs::path& folder) {
   FrameSequence sequence;
-  sequence.name = folder.filename().string();
-  for (const fs::path& file : picture_files(folder)) sequence.frames.push_back({file, 0, 0, {}});
-  for (std::size_t i = 0; i < sequence.frames.size(); ++i) {
-    sequence.frames[i].frame = static_cast<int>(i);
-    sequence.frames[i].t_us = std::llround(static_cast<double>(i) * kMicrosecondsPerSecond / frame_rate_Hz);
+  sequence.name = fs::absolute(folder / "").parent_path().filename().string();
+  for (const fs::path& file : picture_files(folder)) {
+    LabelledFrame frame;
+    frame.file = file;
+    frame.frame = static_cast<int>(sequence.frames.size());
+    frame.t_us = frame.frame;
+    frame.timed = false;
+    sequence.frames.push_back(std::move(frame));
   }
   return sequence;
 }

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "apps/command.h"
+#include "datasets/sources/any_source.h"
+
+namespace touchstone::apps {
+
+/// Where a command's frames come from, and when they were taken.
+struct SourceOptions {
+  datasets::SourceChoice choice;
+  std::string split;  ///< of a data set: "all" or a split's name
+};
+
+/// What else a command asks of its source.
+struct SourceNeeds {
+  std::string split = "all";  ///< the default of --split
+  bool forces = false;        ///< it may be given --forces CSV
+};
+
+/// Adds the source as `name` ("source": without a dash; "--frames") and the options that belong to it: --split,
+/// --times,
+/// --rate, --count, --seconds, --timeout and, if they are wanted, --forces.
+/// @returns null's place: the option of the source, to be required or not
+std::shared_ptr<SourceOptions> add_source_options(CLI::App& command, const std::string& name, const SourceNeeds& needs,
+                                                  bool required = true);
+
+/// The streams that the options name. Of a live source Ctrl-C then ends the frames, not the program; a second one does.
+/// @throws Error as datasets::streams_of
+std::vector<datasets::FrameStream> opened_streams(const SourceOptions& options);
+
+/// The place as it was given, without slashes at its end: for names.
+std::string name_of_source(const SourceOptions& options);
+
+}  // namespace touchstone::apps
