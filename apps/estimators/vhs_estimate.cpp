@@ -87,7 +87,7 @@ void write_distribution(const EstimateOptions& options, const std::vector<lab::T
 std::function<void(const cv::Mat&, const sensors::TrackedBeads&)> shown_forces(
     LiveView* view, const sensors::StiffnessForceModel& model, bool first_is_rest) {
   if (view == nullptr) return {};
-  const std::vector<Eigen::Vector2d> rest = first_is_rest ? std::vector<Eigen::Vector2d>() : model.rest;
+  std::vector<Eigen::Vector2d> rest = first_is_rest ? std::vector<Eigen::Vector2d>() : model.rest;
   return [view, &model, rest, picture = cv::Mat()](const cv::Mat& frame, const sensors::TrackedBeads& beads) mutable {
     if (rest.empty()) rest = beads.positions;
     sensors::draw_overlay(frame, beads, sensors::estimate(model, beads, rest), picture);

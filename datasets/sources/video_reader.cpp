@@ -11,6 +11,7 @@ extern "C" {
 #include <libswscale/swscale.h>
 }
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdarg>
@@ -95,6 +96,7 @@ class Video : public VideoInput {
   int give(TouchstoneVideoFrame& frame);
   int give_fault(TouchstoneVideoFrame& frame, const std::string& why);
   int end(TouchstoneVideoFrame& frame, std::string& message);
+  bool ends_early() const;
   bool convert();
   void set_time(std::int64_t timestamp, TouchstoneVideoFrame& frame);
 
@@ -111,7 +113,7 @@ class Video : public VideoInput {
   TouchstoneVideoFrame shown_ = {};
   std::string fault_, send_fault_;
   std::int64_t start_ = AV_NOPTS_VALUE;
-  std::int64_t packets_ = 0, packet_time_ = AV_NOPTS_VALUE;
+  std::int64_t packets_ = 0, packet_time_ = AV_NOPTS_VALUE, last_end_ = 0;
   bool intra_only_ = true, spoilt_ = false, drained_ = false, ended_ = false, cut_ = false;
   int turned_deg_ = 0;
 };
@@ -199,6 +201,7 @@ bool Video::feed(std::string& message) {
     ++packets_;
     if (packet_->size == 0) continue;  // an AVI's note that a frame was dropped
     packet_time_ = packet_->pts != AV_NOPTS_VALUE ? packet_->pts : packet_->dts;
+    if (packet_time_ != AV_NOPTS_VALUE) last_end_ = std::max(last_end_, packet_time_ + packet_->duration);
     if ((packet_->flags & AV_PKT_FLAG_CORRUPT) != 0) send_fault_ = "is cut off";
     const int sent = avcodec_send_packet(decoder_, packet_);
     if (sent < 0) send_fault_ = "is damaged (" + words_of(sent) + ")";
@@ -230,15 +233,25 @@ int Video::end(TouchstoneVideoFrame& frame, std::string& message) {
   ended_ = true;
   if (patience_.ended()) return 0;
   if (address_) return message.empty() ? 0 : -1;
-  // Some writers count a frame too many.
-  const bool fewer = stream_->nb_frames > 0 && packets_ < stream_->nb_frames - 1;
-  if (!cut_ && !fewer) return 0;
+  if (!cut_ && !ends_early()) return 0;
   frame.timed = 0;
   return give_fault(frame,
                     stream_->nb_frames > 0
                         ? "isn't there: the file ends within the video, after " + std::to_string(packets_) + " of " +
                               std::to_string(stream_->nb_frames) + " frames"
                         : "isn't there: the file ends within the video, after " + std::to_string(packets_) + " frames");
+}
+
+bool Video::ends_early() const {
+  // Some writers count a frame too many.
+  if (stream_->nb_frames > 0) return packets_ < stream_->nb_frames - 1;
+  if (format_->duration <= 0 || packets_ == 0) return false;
+  // The duration is that of the longest stream.
+  const double says_s = static_cast<double>(format_->duration) / AV_TIME_BASE;
+  const std::int64_t start = stream_->start_time == AV_NOPTS_VALUE ? 0 : stream_->start_time;
+  const double has_s = static_cast<double>(last_end_ - start) * av_q2d(stream_->time_base);
+  const double frame_s = has_s / static_cast<double>(packets_);
+  return says_s - has_s > std::max(2.5 * frame_s, format_->nb_streams > 1 ? 0.05 * says_s : 0.0);
 }
 
 void Video::set_time(std::int64_t timestamp, TouchstoneVideoFrame& frame) {

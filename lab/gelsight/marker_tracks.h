@@ -22,6 +22,8 @@ struct MarkerTrackSettings {
   std::filesystem::path rest = {};
   bool overlay = false;      ///< a picture of each frame with its markers' arrows, too
   double arrow_scale = 1.0;  ///< of these (sensors/markers/marker_overlay.h)
+  /// Shown each of these pictures, whether they are kept or not; may be empty.
+  std::function<void(const cv::Mat& picture)> show = {};
   /// If there, contact, slip and what else is known of the gel (forces, heights) is read, too; without a background,
   /// which each sequence has of its own.
   std::optional<sensors::TouchCalibration> touch = {};

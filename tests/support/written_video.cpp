@@ -4,6 +4,8 @@ extern "C" {
 #include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
 #include <libavutil/display.h>
+#include <libavutil/opt.h>
+#include <libavutil/pixdesc.h>
 #include <libswscale/swscale.h>
 }
 
@@ -41,13 +43,17 @@ void write_video(const std::filesystem::path& file, const std::vector<cv::Mat>& 
   encoder->thread_count = 1;
   encoder->bit_rate = 4'000'000;
   encoder->strict_std_compliance = FF_COMPLIANCE_UNOFFICIAL;
+  if (how.codec == "ffv1") {  // with checksums
+    encoder->level = 3;
+    av_opt_set_int(encoder->priv_data, "slicecrc", 1, 0);
+  }
   if ((format->oformat->flags & AVFMT_GLOBALHEADER) != 0) encoder->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
   need(avcodec_open2(encoder, codec, nullptr) >= 0, "its encoder");
   avcodec_parameters_from_context(stream->codecpar, encoder);
   if (how.turned_deg != 0) {
     auto* const matrix = reinterpret_cast<std::int32_t*>(
         av_stream_new_side_data(stream, AV_PKT_DATA_DISPLAYMATRIX, 9 * sizeof(std::int32_t)));
-    av_display_rotation_set(matrix, -how.turned_deg);
+    av_display_rotation_set(matrix, how.turned_deg);
   }
   need(avio_open(&format->pb, file.c_str(), AVIO_FLAG_WRITE) >= 0, "opening it");
   need(avformat_write_header(format, nullptr) >= 0, "its header");
@@ -56,6 +62,7 @@ void write_video(const std::filesystem::path& file, const std::vector<cv::Mat>& 
   const auto send = [&](const AVFrame* frame) {
     need(avcodec_send_frame(encoder, frame) >= 0, "a frame");
     while (avcodec_receive_packet(encoder, packet) >= 0) {
+      packet->duration = how.t_ms.empty() ? 1 : 40;
       packet->stream_index = stream->index;
       av_packet_rescale_ts(packet, encoder->time_base, stream->time_base);
       need(av_interleaved_write_frame(format, packet) >= 0, "writing a frame");

@@ -67,6 +67,10 @@ std::vector<std::pair<int, std::string>> faults_in(const std::vector<SourceFrame
   return faults;
 }
 
+double mean_difference(const cv::Mat& a, const cv::Mat& b) {
+  return cv::norm(a, b, cv::NORM_L1) / static_cast<double>(a.total() * static_cast<std::size_t>(a.channels()));
+}
+
 class VideoSource : public ::testing::Test {
  protected:
   fs::path written(const std::string& name, const std::vector<cv::Mat>& frames, const VideoToWrite& how = {}) const {
@@ -114,7 +118,10 @@ TEST_F(VideoSource, ReadsAsOpenCVDoes) {
     for (const SourceFrame& one : read) {
       ASSERT_TRUE(other.read(frame));
       ASSERT_EQ(one.fault, "") << name;
-      EXPECT_LT(cv::norm(one.image, frame, cv::NORM_L1) / static_cast<double>(3 * frame.total()), 1.5) << name;
+      const cv::Mat truth = painted(one.label.frame);
+      EXPECT_LT(mean_difference(one.image, frame), 2.5) << name;
+      // OpenCV repeats colours that stand for several pixels; here they are interpolated.
+      EXPECT_LT(mean_difference(one.image, truth), mean_difference(frame, truth) + 0.1) << name;
       EXPECT_NEAR(static_cast<double>(one.label.t_us), 1e3 * other.get(cv::CAP_PROP_POS_MSEC), 1.0) << name;
     }
   }
@@ -145,11 +152,11 @@ TEST_F(VideoSource, IsTurnedAsAPlayerTurnsIt) {
                : turn == 180 ? cv::ROTATE_180
                              : cv::ROTATE_90_COUNTERCLOCKWISE);
     ASSERT_EQ(read[0].image.size(), wanted.size()) << turn;
-    EXPECT_LT(cv::norm(read[0].image, wanted, cv::NORM_L1) / static_cast<double>(3 * wanted.total()), 8.0) << turn;
-    cv::VideoCapture other((folder_.path() / "clip.mp4").string(), cv::CAP_FFMPEG);
-    cv::Mat frame;
-    ASSERT_TRUE(other.read(frame));
-    EXPECT_EQ(frame.size(), wanted.size()) << "OpenCV turns it, too";
+    EXPECT_LT(mean_difference(read[0].image, wanted), 8.0) << turn;
+    if (turn != 90) continue;
+    // As a phone writes it: right becomes down, and down becomes left (QuickTime's matrix 0 1 0 / -1 0 0 of 16.16).
+    const std::string matrix("\0\0\0\0\0\1\0\0\0\0\0\0\xff\xff\0\0", 16);
+    EXPECT_THAT(read_whole_file(folder_.path() / "clip.mp4"), HasSubstr(matrix));
   }
 }
 
@@ -160,7 +167,7 @@ TEST_F(VideoSource, CutInTheMiddleKeepsWhatIsThere) {
     const fs::path file = written(name, all_painted(), {.codec = codec, .pixels = pixels});
     const std::vector<SourceFrame> before = frames_in(whole(name));
     EXPECT_TRUE(faults_in(before).empty()) << name << ": " << faults_in(before)[0].second;
-    fs::resize_file(file, fs::file_size(file) / 2);
+    fs::resize_file(file, fs::file_size(file) * 3 / 4);
     const std::vector<SourceFrame> read = frames_in(whole(name));
     const auto faults = faults_in(read);
     ASSERT_FALSE(faults.empty()) << name;
@@ -202,7 +209,7 @@ TEST_F(VideoSource, WhatIsNoVideoIsRefusedByNameInOneLine) {
     return message_of([&] { streams_of({.place = (folder_.path() / name).string()}); });
   };
   folder_.write("text.mp4", "this is no video at all\n");
-  EXPECT_THAT(refused("text.mp4"), AllOf(HasSubstr("text.mp4: can't be read as a video: "), HasSubstr("nvalid")));
+  EXPECT_THAT(refused("text.mp4"), AllOf(HasSubstr("text.mp4: can't be read as a video: "), HasSubstr("moov")));
   folder_.write("empty.mp4", "");
   EXPECT_THAT(refused("empty.mp4"), HasSubstr("empty.mp4: is empty"));
   EXPECT_THAT(refused("none.mp4"), HasSubstr("none.mp4: there is no such folder or file; frames come from"));
