@@ -187,9 +187,9 @@ bool Video::feed(std::string& message) {
     if (error < 0) {
       if (patience_.ended()) return false;
       if (address_) {
-        message = Clock::now() > deadline_ ? nothing_came()
-                  : error == AVERROR_EOF   ? "the stream ended"
-                                           : words_of(error);
+        message = Clock::now() > deadline_                        ? nothing_came()
+                  : error == AVERROR_EOF || error == AVERROR(EIO) ? "the stream ended"
+                                                                  : words_of(error);
         return false;
       }
       cut_ = error != AVERROR_EOF || !last_words.empty();

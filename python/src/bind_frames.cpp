@@ -144,7 +144,7 @@ named in `faults`. Only a few frames are in memory. Raises Error if the source c
       .def(py::init(&frames_from), py::arg("source"), py::kw_only(), py::arg("rate") = py::none(),
            py::arg("times") = py::none(), py::arg("split") = py::none(), py::arg("count") = py::none(),
            py::arg("seconds") = py::none(), py::arg("timeout") = 10.0)
-      .def("__iter__", [](py::object self) { return self; })
+      .def("__iter__", [](Frames& self) -> Frames& { return self; })
       .def("__next__", &Frames::next)
       .def_property_readonly(
           "name", [](const Frames& frames) { return text_of(frames.shown().stem); },

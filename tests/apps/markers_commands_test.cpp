@@ -127,7 +127,7 @@ TEST_F(MarkersCommand, WhatCantBeUsedIsRefusedByName) {
     test::expect_refused(run_program(words), part);
     EXPECT_FALSE(fs::exists(in("out")));
   };
-  refused({in("none")}, "none: isn't a folder");
+  refused({in("none")}, "none: there is no such folder or file");
   refused({in("frames"), "--rest", in("none.png")}, "none.png");
   sim::write_png(folder_.path() / "white.png", cv::Mat(240, 320, CV_8UC3, cv::Scalar::all(255)));
   refused({in("frames"), "--rest", in("white.png")}, "white.png: markers: the frame at rest is saturated");

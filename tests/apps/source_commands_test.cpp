@@ -148,10 +148,12 @@ TEST_F(SourceCommand, CtrlCLeavesWholeTables) {
     sent = i;
     return render::jpeg_bytes(frame(0.1 * (i % 20)), {.quality = 95});
   });
+  const std::string url = server.url(), out = in("out");
   const pid_t child = fork();
   if (child == 0) {
-    execl(TOUCHSTONE_PROGRAM, TOUCHSTONE_PROGRAM, "--quiet", "estimate", "markers", server.url().c_str(), "-o",
-          in("out").c_str(), nullptr);
+    dup2(::open("/dev/null", O_WRONLY), STDOUT_FILENO);
+    execl(TOUCHSTONE_PROGRAM, TOUCHSTONE_PROGRAM, "--quiet", "estimate", "markers", url.c_str(), "-o", out.c_str(),
+          nullptr);
     _exit(127);
   }
   while (sent < 10) std::this_thread::sleep_for(std::chrono::milliseconds(5));
@@ -169,11 +171,12 @@ TEST_F(SourceCommand, ALiveViewShowsEachFrameWithItsMarkers) {
   MjpegServer server([&](int i) { return watched ? "" : render::jpeg_bytes(frame(0.1 * (i % 20)), {.quality = 95}); });
   int out[2];
   ASSERT_EQ(pipe2(out, O_CLOEXEC), 0);
+  const std::string url = server.url(), folder = in("out");
   const pid_t child = fork();
   if (child == 0) {
     dup2(out[1], STDOUT_FILENO);
-    execl(TOUCHSTONE_PROGRAM, TOUCHSTONE_PROGRAM, "--quiet", "estimate", "markers", server.url().c_str(), "-o",
-          in("out").c_str(), "--live", "0", nullptr);
+    execl(TOUCHSTONE_PROGRAM, TOUCHSTONE_PROGRAM, "--quiet", "estimate", "markers", url.c_str(), "-o", folder.c_str(),
+          "--live", "0", nullptr);
     _exit(127);
   }
   ::close(out[1]);

@@ -79,6 +79,25 @@ def test_what_is_no_source_is_an_error(folder, tmp_path):
             ts.frames(folder, **wrong)
 
 
+def test_a_served_sensor_is_a_source():
+    program = os.environ.get("TOUCHSTONE_PROGRAM")
+    if not program:
+        pytest.skip("the program isn't built")
+    device = os.path.join(os.path.dirname(__file__), "../../python/examples/quick-sensor.yaml")
+    served = subprocess.Popen([program, "--quiet", "serve", device, "--port", "0"],
+                              stdout=subprocess.PIPE, text=True)
+    try:
+        address = next(line for line in served.stdout if line.startswith("frames: ")).split()[1]
+        times = []
+        for seconds, image in ts.frames(address, count=5, timeout=60):
+            assert image.dtype == np.uint8 and image.ndim == 3 and image.std() > 0
+            times.append(seconds)
+        assert len(times) == 5 and times[0] == 0.0 and np.all(np.diff(times) > 0)
+    finally:
+        served.send_signal(signal.SIGINT)
+        served.wait(60)
+
+
 def serve_jpegs(frames):
     """Sends JPEGs, then nothing more."""
     done = threading.Event()
