@@ -32,6 +32,7 @@ struct VideoPatience {
 /// Null, and `message`, if it can't be opened.
 std::unique_ptr<VideoInput> open_video(const std::string& place, bool address, const VideoPatience& patience,
                                        TouchstoneVideoInfo& info, std::string& message);
+/// The same of a camera's number.
 std::unique_ptr<VideoInput> open_camera(const std::string& number, const VideoPatience& patience,
                                         TouchstoneVideoInfo& info, std::string& message);
 
