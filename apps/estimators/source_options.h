@@ -25,7 +25,6 @@ struct SourceNeeds {
 /// Adds the source as `name` ("source": without a dash; "--frames") and the options that belong to it: --split,
 /// --times,
 /// --rate, --count, --seconds, --timeout and, if they are wanted, --forces.
-/// @returns null's place: the option of the source, to be required or not
 std::shared_ptr<SourceOptions> add_source_options(CLI::App& command, const std::string& name, const SourceNeeds& needs,
                                                   bool required = true);
 

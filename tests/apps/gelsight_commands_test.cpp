@@ -84,9 +84,10 @@ TEST_F(GelsightCommands, RecordedFramesGiveHeightMaps) {
               HasSubstr("file,highest_mm,volume_mm3,contact_mm2,saturated_percent,trusted,contact_at_border,fault\n"));
   EXPECT_THAT(csv, HasSubstr("\ndark.png,"));
 
-  const ProgramRun levels = run_program(
-      {"estimate", "gelsight", "--model", in("m.gel"), "--frames", in("new"), "-o", in("png"), "--format", "png16"});
+  const ProgramRun levels = run_program({"estimate", "gelsight", "--model", in("m.gel"), "--frames", in("new"), "-o",
+                                         in("png"), "--format", "png16", "--live", "0"});
   ASSERT_EQ(levels.exit_code, 0) << levels.err;
+  EXPECT_THAT(levels.out, HasSubstr("live: http://127.0.0.1:"));
   cv::Mat from_levels;
   sim::read_image(folder_.path() / "png/ball.png").convertTo(from_levels, CV_32F, 1e-4, -1.0);
   EXPECT_LT(cv::norm(from_levels, map.image, cv::NORM_INF), 6e-5);

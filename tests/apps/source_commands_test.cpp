@@ -129,6 +129,17 @@ TEST_F(SourceCommand, ADamagedFrameOfAStreamIsNamedAndTheNextOnesRead) {
   EXPECT_EQ(csv_table(folder_.path() / "out/markers.csv").size(), 5U * 63U + 1U);
 }
 
+TEST_F(SourceCommand, AFrameOfAnotherSizeIsNamedAndTheNextOnesRead) {
+  MjpegServer server([](int i) {
+    const cv::Mat picture = frame(0.1 * (i % 20));
+    return render::jpeg_bytes(i == 2 ? picture.rowRange(0, 160).clone() : picture, {.quality = 95});
+  });
+  const auto run = markers(server.url(), {"--count", "5"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.err, AllOf(HasSubstr("frame 2: "), HasSubstr("160"), Not(HasSubstr("frame 3"))));
+  EXPECT_EQ(csv_table(folder_.path() / "out/markers.csv").size(), 4U * 63U + 1U);
+}
+
 TEST_F(SourceCommand, AStreamThatEndsOrStallsLeavesWholeTables) {
   for (const bool stalls : {false, true}) {
     MjpegServer server([](int i) { return i < 5 ? render::jpeg_bytes(frame(0.1 * i), {.quality = 95}) : ""; }, stalls);

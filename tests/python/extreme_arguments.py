@@ -736,6 +736,14 @@ def table(t):
         "HueEstimator.estimate": lambda: [Call(lambda: ts.HueEstimator(t.hue_model, t.reader.rest).estimate, {
             "reading": (t.reader.rest, only(t.small_reading, t.large_reading, *STRANGE))})],
         "read_image": lambda: [Call(lambda: ts.read_image, {"path": (t.png, paths)})],
+        "frames": lambda: [
+            Call(lambda: lambda **how: list(ts.frames(**how)), {
+                "source": (t.png, paths), "rate": (30.0, numbers), "count": (1, numbers), "seconds": (1.0, numbers),
+                "timeout": (1.0, numbers)}),
+            Call(lambda: lambda **how: list(ts.frames(**how)), {
+                "source": (t.png, only()), "times": (None, paths)}),
+            Call(lambda: lambda **how: list(ts.frames(**how)), {
+                "source": (t.scene_set, only()), "split": ("all", texts)})],
         "write_png": lambda: [Call(lambda: ts.write_png, {"path": ("y.png", paths), "image": (image, pictures)})
                               for image in (markers_picture(), beads_picture())],
         "scenes_folder": lambda: [Call(lambda: ts.scenes_folder)],

@@ -19,8 +19,15 @@ with tempfile.TemporaryDirectory() as folder:
     picture = f"{folder}/frame.png"
     ts.write_png(picture, touch.frame)
     assert np.array_equal(ts.read_image(picture), touch.frame)
-modules = [line for line in pathlib.Path("/proc/self/maps").read_text().splitlines() if "touchstone_image_module" in line]
-assert modules and all(f"{prefix}/lib" in line for line in modules), f"{modules[:1]} isn't below {prefix}"
+    pathlib.Path(f"{folder}/clip.avi").write_text("no video")
+    try:
+        ts.frames(f"{folder}/clip.avi")
+    except ts.Error as error:
+        assert "can't be read as a video" in str(error), error
+for module in ("image", "video"):
+    loaded = [line for line in pathlib.Path("/proc/self/maps").read_text().splitlines()
+              if f"touchstone_{module}_module" in line]
+    assert loaded and all(f"{prefix}/lib" in line for line in loaded), f"{loaded[:1]} isn't below {prefix}"
 
 data = ts.Dataset(data_set, "train")
 assert data.array("frame").shape[1:] == touch.frame.shape and len(data) > 0
