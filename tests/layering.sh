@@ -75,7 +75,7 @@ lab/likeness: core render/imager sensors/heights sim/files sim/scene sim/sensor 
 lab/fit: core render/imager sensors/heights sim/files sim/relief sim/scene sim/press sim/view sim/sensor datasets/jobs datasets/sets datasets/inspection lab/validation lab/gelsight lab/studies lab/likeness
 lab/schema: core sim/scene datasets/jobs lab/vhs lab/studies lab/fit
 apps: core plots render/imager sensors/tractions sensors/events sim/files sim/scene sim/plan sim/press sim/view sim/sensor sim/need sim/cost datasets/jobs datasets/sets datasets/sources datasets/exports datasets/inspection lab/validation lab/press lab/device lab/dvs lab/studies lab/bench lab/likeness lab/fit lab/schema
-apps/estimators: core sensors/beads sensors/heights sensors/touch_map sensors/texture sensors/markers sensors/colour sensors/tractions sensors/events datasets/sets datasets/sources lab/vhs lab/gelsight lab/dtact lab/chroma lab/dvs apps
+apps/estimators: core sensors/beads sensors/heights sensors/touch_map sensors/texture sensors/markers sensors/colour sensors/tractions sensors/events sim/files datasets/sets datasets/sources lab/vhs lab/gelsight lab/dtact lab/chroma lab/dvs apps
 python: core sensors/learning sensors/beads sensors/heights sensors/touch_map sensors/texture sensors/markers sensors/colour sensors/events sim/files sim/scene sim/press sim/sensor datasets/jobs datasets/sets datasets/sources
 testing: core sim/files sim/press sim/sensor datasets/jobs lab/device
 END

@@ -4,6 +4,7 @@
 
 #include "apps/command.h"
 #include "apps/estimators/live_options.h"
+#include "apps/estimators/overlay_sink.h"
 #include "apps/estimators/source_options.h"
 #include "apps/progress_bar.h"
 #include "lab/gelsight/height_maps.h"
@@ -13,13 +14,14 @@
 namespace touchstone::apps {
 namespace {
 
-constexpr double kWhite_mm = 1.0;  // of the live view's heights
+constexpr double kWhite_mm = 1.0;  // of the heights in overlays
 
 struct EstimateOptions {
   std::filesystem::path model;
   std::filesystem::path out;
   std::string border = "zero";
   std::string format = "exr";
+  bool overlay = false;
 };
 
 void estimate(const EstimateOptions& options, const SourceOptions& source, const LiveOptions& live,
@@ -29,11 +31,13 @@ void estimate(const EstimateOptions& options, const SourceOptions& source, const
   if (options.border == "free") settings.border = sensors::HeightBorder::free;
   const lab::HeightFormat format = options.format == "exr" ? lab::HeightFormat::exr : lab::HeightFormat::png16;
   const std::unique_ptr<LiveView> view = opened_view(live, "heights of " + source.choice.place);
-  std::function<void(const cv::Mat&, const sensors::HeightResult&)> show;
-  if (view) {
-    show = [&view, picture = cv::Mat()](const cv::Mat& frame, const sensors::HeightResult& result) mutable {
-      sensors::draw_overlay(frame, result, kWhite_mm, picture);
-      view->show(picture);
+  const OverlaySink sink(options.overlay ? options.out / "overlay" : "", view.get());
+  std::function<void(const datasets::SourceFrame&, const sensors::HeightResult&)> show;
+  if (sink.wanted()) {
+    show = [&sink, picture = cv::Mat()](const datasets::SourceFrame& frame,
+                                        const sensors::HeightResult& result) mutable {
+      sensors::draw_overlay(frame.image, result, kWhite_mm, picture);
+      sink.take(frame.stem, picture);
     };
   }
   ProgressBar bar(global.quiet);
@@ -73,6 +77,8 @@ void add_gelsight_estimation(CLI::App& estimations, const GlobalOptions& global,
                    "'exr': floats in mm; 'png16': 16 bit, 0.1 um a level, level 10000 is 0 mm")
       ->check(CLI::IsMember({"exr", "png16"}))
       ->capture_default_str();
+  command->add_flag("--overlay", options->overlay,
+                    "Pictures of the frames with the contact's outline, beside their heights (white: 1 mm), too");
   const auto live = add_live_options(*command);
   command->callback([&action, options, source, live, &global] {
     action = [options, source, live, &global] { estimate(*options, *source, *live, global); };

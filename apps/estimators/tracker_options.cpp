@@ -34,7 +34,7 @@ std::shared_ptr<FrameOptions> add_frame_options(CLI::App& command, const std::st
 
 std::vector<lab::TrackedSequence> tracked_frames(
     const FrameOptions& options, const GlobalOptions& global,
-    const std::function<void(const cv::Mat& frame, const sensors::TrackedBeads& beads)>& show) {
+    const std::function<void(const datasets::SourceFrame& frame, const sensors::TrackedBeads& beads)>& show) {
   sensors::BeadTrackerSettings settings = options.tracker;
   if (options.bright_beads) settings.appearance.polarity = sensors::BeadPolarity::kBright;
   if (options.weighted_centroid) settings.centroid = sensors::CentroidKind::kWeighted;

@@ -27,6 +27,6 @@ std::shared_ptr<FrameOptions> add_frame_options(CLI::App& command, const std::st
 /// @param show as lab::track's @throws Error if they don't fit together
 std::vector<lab::TrackedSequence> tracked_frames(
     const FrameOptions& options, const GlobalOptions& global,
-    const std::function<void(const cv::Mat& frame, const sensors::TrackedBeads& beads)>& show = {});
+    const std::function<void(const datasets::SourceFrame& frame, const sensors::TrackedBeads& beads)>& show = {});
 
 }  // namespace touchstone::apps

@@ -2,6 +2,7 @@
 
 #include "apps/command.h"
 #include "apps/estimators/live_options.h"
+#include "apps/estimators/overlay_sink.h"
 #include "apps/estimators/tracker_options.h"
 #include "core/error.h"
 #include "core/whole_file.h"
@@ -18,7 +19,7 @@ constexpr const char* kAxes = "xyz";
 
 struct EstimateOptions {
   std::filesystem::path model;
-  std::filesystem::path out;
+  std::filesystem::path out, overlay;
   std::string rest = "model";
   std::filesystem::path compliance;
   std::filesystem::path distribution;
@@ -82,16 +83,17 @@ void write_distribution(const EstimateOptions& options, const std::vector<lab::T
   }
 }
 
-/// What shows each frame's beads with the force that they give; of the model's rest positions, or those of the first
-/// frame that is shown.
-std::function<void(const cv::Mat&, const sensors::TrackedBeads&)> shown_forces(
-    LiveView* view, const sensors::StiffnessForceModel& model, bool first_is_rest) {
-  if (view == nullptr) return {};
+/// What draws each frame's beads with the force that they give; of the model's rest positions, or those of the first
+/// frame that is drawn.
+std::function<void(const datasets::SourceFrame&, const sensors::TrackedBeads&)> drawn_forces(
+    const OverlaySink& sink, const sensors::StiffnessForceModel& model, bool first_is_rest) {
+  if (!sink.wanted()) return {};
   std::vector<Eigen::Vector2d> rest = first_is_rest ? std::vector<Eigen::Vector2d>() : model.rest;
-  return [view, &model, rest, picture = cv::Mat()](const cv::Mat& frame, const sensors::TrackedBeads& beads) mutable {
+  return [&sink, &model, rest, picture = cv::Mat()](const datasets::SourceFrame& frame,
+                                                    const sensors::TrackedBeads& beads) mutable {
     if (rest.empty()) rest = beads.positions;
-    sensors::draw_overlay(frame, beads, sensors::estimate(model, beads, rest), picture);
-    view->show(picture);
+    sensors::draw_overlay(frame.image, beads, sensors::estimate(model, beads, rest), picture);
+    sink.take(frame.stem, picture);
   };
 }
 
@@ -106,8 +108,9 @@ void estimate(const EstimateOptions& options, const FrameOptions& frames, const 
   with_grid.tracker.grid = model.grid;
   const bool first_is_rest = options.rest == "first";
   const std::unique_ptr<LiveView> view = opened_view(live, "forces of " + frames.source->choice.place);
+  const OverlaySink sink(options.overlay, view.get());
   const std::vector<lab::TrackedSequence> tracked =
-      tracked_frames(with_grid, global, shown_forces(view.get(), model, first_is_rest));
+      tracked_frames(with_grid, global, drawn_forces(sink, model, first_is_rest));
   if (!options.compliance.empty()) write_distribution(options, tracked, model);
   const lab::RestChoice rest = first_is_rest ? lab::RestChoice::first_frame : lab::RestChoice::model;
   const std::vector<lab::ForceRecord> records = lab::estimate_forces(tracked, model, rest);
@@ -156,6 +159,7 @@ void add_vhs_estimation(CLI::App& estimations, const GlobalOptions& global, Acti
                    "Error of a bead's displacement along x and y, for the tractions")
       ->check(CLI::Range(1e-5, 1.0))
       ->capture_default_str();
+  command->add_option("--overlay", options->overlay, "A folder for pictures of the frames with beads and force");
   const auto live = add_live_options(*command);
   command->callback([&action, &global, options, frames, live] {
     action = [options, frames, live, &global] { estimate(*options, *frames, *live, global); };

@@ -54,7 +54,7 @@ std::vector<HeightRecord> write_height_maps(
     const sensors::HeightModel& model, const sensors::HeightSettings& settings,
     const std::vector<datasets::FrameStream>& streams, const fs::path& folder, HeightFormat format,
     const Progress& progress,
-    const std::function<void(const cv::Mat& frame, const sensors::HeightResult& result)>& show) {
+    const std::function<void(const datasets::SourceFrame& frame, const sensors::HeightResult& result)>& show) {
   sensors::HeightEstimator estimator(model, settings);
   fs::create_directories(folder);
   const double pixel_mm2 = model.mm_per_px * model.mm_per_px;
@@ -73,7 +73,7 @@ std::vector<HeightRecord> write_height_maps(
       record.trusted = result.trusted();
       record.contact_at_border = result.contact_at_border;
       height_mm = result.height_mm;
-      if (show) show(image, result);
+      if (show) show(frame, result);
     });
     if (record.fault.empty()) {
       write_height_map(height_mm, folder / (frame.stem + ".png"), format);

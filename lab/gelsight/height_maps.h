@@ -54,7 +54,7 @@ std::vector<HeightRecord> write_height_maps(
     const sensors::HeightModel& model, const sensors::HeightSettings& settings,
     const std::vector<datasets::FrameStream>& streams, const std::filesystem::path& folder, HeightFormat format,
     const Progress& progress = {},
-    const std::function<void(const cv::Mat& frame, const sensors::HeightResult& result)>& show = {});
+    const std::function<void(const datasets::SourceFrame& frame, const sensors::HeightResult& result)>& show = {});
 
 /// What a table of frames calls one of them: the file's name, with its sequence before it where there are several.
 std::string name_in_table(const datasets::SourceFrame& frame);

@@ -55,7 +55,7 @@ void require_first(const TrackedSequence& sequence) {
 std::vector<TrackedSequence> track(
     const std::vector<datasets::FrameStream>& streams, const sensors::BeadTrackerSettings& settings,
     const Progress& progress,
-    const std::function<void(const cv::Mat& frame, const sensors::TrackedBeads& beads)>& show) {
+    const std::function<void(const datasets::SourceFrame& frame, const sensors::TrackedBeads& beads)>& show) {
   const std::int64_t total = datasets::frames_of(streams);
   std::atomic<std::int64_t> done{0};
   std::vector<TrackedSequence> tracked(streams.size());
@@ -74,7 +74,7 @@ std::vector<TrackedSequence> track(
         to.source.frames.push_back(frame.label);
         if (show) {
           const std::lock_guard<std::mutex> lock(showing);
-          show(frame.image, to.beads.back());
+          show(frame, to.beads.back());
         }
       } else {
         to.without_first = to.without_first || frames == 0;

@@ -42,7 +42,7 @@ void require_first(const TrackedSequence& sequence);
 std::vector<TrackedSequence> track(
     const std::vector<datasets::FrameStream>& streams, const sensors::BeadTrackerSettings& settings,
     const Progress& progress = {},
-    const std::function<void(const cv::Mat& frame, const sensors::TrackedBeads& beads)>& show = {});
+    const std::function<void(const datasets::SourceFrame& frame, const sensors::TrackedBeads& beads)>& show = {});
 
 /// Training samples of tracked sequences. The rest positions are the mean over the sequences' first frames; frames in
 /// which a bead wasn't measured are left out.

@@ -85,9 +85,11 @@ TEST_F(GelsightCommands, RecordedFramesGiveHeightMaps) {
   EXPECT_THAT(csv, HasSubstr("\ndark.png,"));
 
   const ProgramRun levels = run_program({"estimate", "gelsight", "--model", in("m.gel"), "--frames", in("new"), "-o",
-                                         in("png"), "--format", "png16", "--live", "0"});
+                                         in("png"), "--format", "png16", "--live", "0", "--overlay"});
   ASSERT_EQ(levels.exit_code, 0) << levels.err;
   EXPECT_THAT(levels.out, HasSubstr("live: http://127.0.0.1:"));
+  const cv::Mat drawn = sim::read_image(folder_.path() / "png/overlay/ball.png");
+  EXPECT_EQ(drawn.size(), cv::Size(2 * map.image.cols, map.image.rows));
   cv::Mat from_levels;
   sim::read_image(folder_.path() / "png/ball.png").convertTo(from_levels, CV_32F, 1e-4, -1.0);
   EXPECT_LT(cv::norm(from_levels, map.image, cv::NORM_INF), 6e-5);
