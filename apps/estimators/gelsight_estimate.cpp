@@ -7,6 +7,8 @@
 #include "apps/estimators/overlay_sink.h"
 #include "apps/estimators/source_options.h"
 #include "apps/progress_bar.h"
+#include "core/error.h"
+#include "datasets/sources/any_source.h"
 #include "lab/gelsight/height_maps.h"
 #include "sensors/heights/height_model_file.h"
 #include "sensors/heights/height_overlay.h"
@@ -14,20 +16,41 @@
 namespace touchstone::apps {
 namespace {
 
-constexpr double kWhite_mm = 1.0;  // of the heights in overlays
+constexpr double kWhite_mm = 1.0;       // of the heights in overlays
+constexpr std::int64_t kMostRest = 64;  // frames that a background is the mean of
 
 struct EstimateOptions {
   std::filesystem::path model;
   std::filesystem::path out;
+  std::string rest;
+  double follow = 0.0;
   std::string border = "zero";
   std::string format = "exr";
   bool overlay = false;
 };
 
+/// Frames of the gel at rest in the place of the calibration's background.
+void take_rest(const std::string& place, sensors::HeightModel& model) {
+  if (datasets::is_live(place)) fail("--rest: {} is live; recorded frames of the gel at rest are needed", place);
+  datasets::SourceChoice choice;
+  choice.place = place;
+  choice.most_frames = kMostRest;
+  std::vector<cv::Mat> frames;
+  datasets::for_each_frame(datasets::streams_of(choice), [&](const datasets::SourceFrame& frame) {
+    if (!frame.fault.empty()) fail("--rest: {}", frame.fault);
+    const std::string fault = sensors::frame_fault(frame.image, model.background.mean.size());
+    if (!fault.empty()) fail("--rest: {} {}", frame.title, fault);
+    frames.push_back(frame.image);
+  });
+  model.background = sensors::mean_background(frames);
+}
+
 void estimate(const EstimateOptions& options, const SourceOptions& source, const LiveOptions& live,
               const GlobalOptions& global) {
-  const sensors::HeightModel model = sensors::load_height_model(options.model);
+  sensors::HeightModel model = sensors::load_height_model(options.model);
+  if (!options.rest.empty()) take_rest(options.rest, model);
   sensors::HeightSettings settings;
+  settings.follow.frames = options.follow;
   if (options.border == "free") settings.border = sensors::HeightBorder::free;
   const lab::HeightFormat format = options.format == "exr" ? lab::HeightFormat::exr : lab::HeightFormat::png16;
   const std::unique_ptr<LiveView> view = opened_view(live, "heights of " + source.choice.place);
@@ -50,7 +73,10 @@ void estimate(const EstimateOptions& options, const SourceOptions& source, const
   const auto at_border = count([](const lab::HeightRecord& record) { return record.contact_at_border; });
   fmt::print("{}: {} height maps and heights.csv\n", options.out.string(), records.size() - faults.size());
   if (untrusted > 0) {
-    fmt::print("  {} of them of frames that are overexposed, dark or of one colour: not to be trusted\n", untrusted);
+    fmt::print(
+        "  {} of them of frames that are overexposed, dark, of one colour or nowhere like the gel at rest: not to "
+        "be trusted\n",
+        untrusted);
   }
   if (at_border > 0) {
     fmt::print("  {} with a contact that runs out of the picture{}\n", at_border,
@@ -67,6 +93,14 @@ void add_gelsight_estimation(CLI::App& estimations, const GlobalOptions& global,
   const auto source = add_source_options(*command, "--frames", {});
   command->add_option("-o,--out", options->out, "The folder of the height maps and their summary, heights.csv")
       ->required();
+  command->add_option("--rest", options->rest,
+                      "Frames of the gel at rest, in place of the calibration's: a folder, a video or one picture, of "
+                      "which the first 64 count");
+  command
+      ->add_option("--follow", options->follow,
+                   "Follow light that drifts, where nothing touches, to 63 % within so many frames; 0: not")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
   command
       ->add_option("--border", options->border,
                    "Height at the picture's border: 'zero', or 'free' where contacts run out of the picture")

@@ -47,7 +47,8 @@ std::shared_ptr<SourceOptions> add_source_options(CLI::App& command, const std::
                        "Times and forces of recorded frames, on the object, x to the picture's right, y down: CSV with "
                        "the header file,t_us,force_x_N,force_y_N,force_z_N; of a video frame,... in place of file,...");
   }
-  command.add_option("--rate", choice.rate_Hz, "Frames a second, in place of the times that a recording has")
+  command
+      .add_option("--rate,--frame-rate", choice.rate_Hz, "Frames a second, in place of the times that a recording has")
       ->check(CLI::Range(1e-3, 1e6));
   command.add_option("--count", choice.most_frames, "End after so many frames")
       ->check(CLI::Range(std::int64_t{1}, std::int64_t{1} << 40));

@@ -21,7 +21,7 @@ void require_times(const datasets::FrameStream& stream) {
 
 std::shared_ptr<FrameOptions> add_frame_options(CLI::App& command, const std::string& split) {
   auto options = std::make_shared<FrameOptions>();
-  options->source = add_source_options(command, "--frames", {.split = split, .forces = true});
+  options->source = add_source_options(command, "--frames,--data", {.split = split, .forces = true});
   command.add_option("--roi-a", options->tracker.roi_a_px, "Side of the region that holds all beads, px")
       ->capture_default_str();
   command.add_option("--roi-b", options->tracker.roi_b_px, "Side of the window round one bead, px")

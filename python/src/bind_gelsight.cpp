@@ -15,6 +15,8 @@ using sensors::HeightModel;
 using Heights = Guarded<sensors::HeightEstimator>;
 
 const Allowed kThicknesses = Allowed::within(0.01, 1000.0);  // mm
+const Allowed kFollowed = Allowed::within(0.0, 1e6);         // frames
+
 std::optional<sensors::LightCorrection> correction_named(const std::string& name) {
   if (name == "best") return std::nullopt;
   if (name == "none") return sensors::LightCorrection::none;
@@ -77,9 +79,13 @@ sensors::HeightResult copy_of(const sensors::HeightResult& result) {
   return copy;
 }
 
-std::shared_ptr<Heights> make_estimator(const HeightModel& model, const py::object& border_name) {
+std::shared_ptr<Heights> make_estimator(const HeightModel& model, const py::object& border_name, double follow_frames) {
   const std::string border = text_from(border_name, "border");
   sensors::HeightSettings settings;
+  if (!kFollowed.holds(follow_frames)) {
+    fail("follow_frames: {} is not allowed; allowed is {}", follow_frames, kFollowed.text());
+  }
+  settings.follow.frames = follow_frames;
   if (border == "free") {
     settings.border = sensors::HeightBorder::free;
   } else if (border != "zero") {
@@ -142,12 +148,18 @@ void bind_gelsight(py::module_& module) {
           "gain", [](const HeightResult& self) { return py::make_tuple(self.gain[0], self.gain[1], self.gain[2]); },
           "(blue, green, red): what the frame's channels were stronger by than the background's.")
       .def_readonly("contact_at_border", &HeightResult::contact_at_border, "The contact runs out of the picture.")
-      .def_property_readonly("trusted", &HeightResult::trusted, "Neither overexposed nor dark nor of one colour.");
+      .def_readonly("rest_share", &HeightResult::rest_share, "Of the picture: as the gel at rest.")
+      .def_property_readonly("trusted", &HeightResult::trusted,
+                             "Neither overexposed nor dark nor of one colour, and somewhere as the gel at rest.");
   py::class_<Heights, std::shared_ptr<Heights>>(
       module, "HeightEstimator",
-      "Frame in, height map out. HeightEstimator(model, *, border='zero'); border 'free' where contacts run out of the "
-      "picture. Calls from several threads wait for each other.")
-      .def(py::init(&make_estimator), py::arg("model"), py::kw_only(), py::arg("border") = "zero")
+      "Frame in, height map out. HeightEstimator(model, *, border='zero', follow_frames=0); border 'free' where "
+      "contacts "
+      "run out of the picture. With follow_frames the picture of the gel at rest is followed as light drifts, where "
+      "nothing touches, to 63 % within so many frames: a result then depends on the frames before it. Calls from "
+      "several threads wait for each other.")
+      .def(py::init(&make_estimator), py::arg("model"), py::kw_only(), py::arg("border") = "zero",
+           py::arg("follow_frames") = 0.0)
       .def(
           "estimate",
           [](Heights& self, const py::object& frame) {
@@ -155,6 +167,18 @@ void bind_gelsight(py::module_& module) {
             return self.with([&](auto& estimator) { return copy_of(estimator.estimate(picture.mat)); });
           },
           py::arg("frame"), "The HeightResult of a frame, uint8, BGR, of the model's size.")
+      .def(
+          "set_rest",
+          [](Heights& self, const py::object& frames) {
+            const std::vector<Picture> rest = pictures_from(frames, "frames");
+            std::vector<cv::Mat> mats;
+            for (const Picture& picture : rest) mats.push_back(picture.mat);
+            self.with([&](auto& estimator) {
+              estimator.set_rest(mats);
+              return true;
+            });
+          },
+          py::arg("frames"), "Takes frames of the gel at rest in place of the calibration's, as after a scratch.")
       .def(
           "doubts",
           [](Heights& self, const py::object& frame) {

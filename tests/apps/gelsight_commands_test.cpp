@@ -95,6 +95,45 @@ TEST_F(GelsightCommands, RecordedFramesGiveHeightMaps) {
   EXPECT_LT(cv::norm(from_levels, map.image, cv::NORM_INF), 6e-5);
 }
 
+TEST_F(GelsightCommands, OtherFramesAtRestAndDriftingLightAreFollowed) {
+  ASSERT_EQ(calibrate(kHeader + lines_[0] + lines_[1] + lines_[2], {"rest.png"}).exit_code, 0);
+  const auto dimmed = [](const cv::Mat& frame, double share) {
+    cv::Mat dimmed;
+    frame.convertTo(dimmed, CV_8U, share);
+    return dimmed;
+  };
+  fs::create_directories(folder_.path() / "drift");
+  for (int k = 0; k < 40; ++k) {
+    sim::write_png(folder_.path() / "drift" / fmt::format("{}.png", k), dimmed(painter_.rest(), 1.0 - 0.004 * k));
+  }
+  sim::write_png(folder_.path() / "drift/40.png", dimmed(painter_.press(ball_).frame, 0.84));
+  sim::write_png(folder_.path() / "dim.png", dimmed(painter_.rest(), 0.84));
+  const cv::Mat truth = painter_.heights([&](const Eigen::Vector2d& place) { return ball_.at(place); });
+  const auto off = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> words = {"estimate", "gelsight",  "--model", in("m.gel"),
+                                      "--frames", in("drift"), "-o",      in("out")};
+    words.insert(words.end(), more.begin(), more.end());
+    const ProgramRun run = run_program(words);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return cv::norm(sim::read_exr(folder_.path() / "out/40.exr").image, truth, cv::NORM_INF);
+  };
+  const double still = off({"--rest", in("dim.png")});
+  const double followed = off({"--follow", "4"});
+  const double stale = off({});
+  EXPECT_LT(still, 0.1);
+  EXPECT_LT(followed, 0.1);
+  EXPECT_GT(stale, 1.2 * std::max(still, followed));
+  const auto refusal = [&](const std::string& rest) {
+    const ProgramRun run = run_program(
+        {"estimate", "gelsight", "--model", in("m.gel"), "--frames", in("new"), "-o", in("out"), "--rest", rest});
+    EXPECT_EQ(run.exit_code, 2);
+    return run.err;
+  };
+  EXPECT_THAT(refusal(in("cal/grey.png")), AllOf(HasSubstr("grey.png"), HasSubstr("is grey")));
+  EXPECT_THAT(refusal("http://127.0.0.1:1/"), HasSubstr("recorded frames"));
+  EXPECT_THAT(refusal(in("nowhere")), HasSubstr("there is no such folder or file"));
+}
+
 TEST_F(GelsightCommands, ADamagedFrameIsRefusedAloneAndNamed) {
   ASSERT_EQ(calibrate(kHeader + lines_[0] + lines_[1] + lines_[2], {"rest.png"}).exit_code, 0);
   const cv::Mat frame = painter_.press(ball_).frame;

@@ -617,10 +617,12 @@ def table(t):
         "HeightModel.load": lambda: [Call(lambda: ts.HeightModel.load, {"path": (t.height_file, paths)})],
         "HeightModel.save": lambda: [Call(lambda: t.height_model.save, {"path": ("y", paths)})],
         "HeightEstimator": lambda: [Call(lambda: ts.HeightEstimator, {
-            "model": (t.height_model, only(*STRANGE)), "border": ("free", texts)})],
+            "model": (t.height_model, only(*STRANGE)), "border": ("free", texts), "follow_frames": (30.0, numbers)})],
         "HeightEstimator.estimate": lambda: [
             Call(lambda border=border: ts.HeightEstimator(t.height_model, border=border).estimate, {
                 "frame": (t.touch.frame, pictures)}) for border in ("zero", "free")],
+        "HeightEstimator.set_rest": lambda: [Call(lambda: ts.HeightEstimator(t.height_model).set_rest, {
+            "frames": (t.heights[0][2], lists_of(pictures))})],
         "HeightEstimator.doubts": lambda: [Call(lambda: ts.HeightEstimator(t.height_model).doubts, {
             "frame": (t.touch.frame, pictures)})],
         "calibrate_height": lambda: [Call(lambda: ts.calibrate_height, {

@@ -468,3 +468,13 @@ def test_heights_are_checked_and_shared_between_threads(sensor, ball):
         ts.calibrate_height([np.broadcast_to(np.uint8(1), (2**31, 2**20, 3))], [3.0], background, mm_per_px=0.1)
     with pytest.raises(ts.Error, match="border: 'open' is not known"):
         ts.HeightEstimator(model, border="open")
+    with pytest.raises(ts.Error, match="follow_frames: -1 is not allowed"):
+        ts.HeightEstimator(model, follow_frames=-1)
+    # Light that has changed at once isn't followed, but new frames at rest are taken.
+    estimator = ts.HeightEstimator(model, follow_frames=10)
+    darker = [(0.8 * rest.astype(float)).astype(np.uint8) for rest in background]
+    result = estimator.estimate(darker[0])
+    assert result.rest_share < 0.05 and not result.trusted
+    estimator.set_rest(darker)
+    result = estimator.estimate(darker[0])
+    assert result.rest_share > 0.95 and result.trusted and not result.contact.any()
