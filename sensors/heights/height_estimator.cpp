@@ -267,7 +267,7 @@ const HeightResult& HeightEstimator::estimate(const cv::Mat& frame) {
   result_.flat = is_flat(frame);
   result_.contact_at_border = touches_border(result_.contact);
   result_.rest_share = follower_.look(planes_, result_.gain);
-  result_.unlike = result_.rest_share < settings_.least_rest;
+  result_.unlike = settings_.border == HeightBorder::zero && result_.rest_share < settings_.least_rest;
   if (settings_.follow.frames > 0.0 && result_.trusted()) {
     follower_.follow(frame, result_.gain, result_.contact, model_.background.mean);
     take_background();

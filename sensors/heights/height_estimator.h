@@ -48,8 +48,8 @@ struct HeightResult {
   bool overexposed = false;       ///< more lost pixels than the settings allow: heights there are too flat
   bool dark = false;              ///< more black pixels than the settings allow: no light, or a covered camera
   bool flat = false;              ///< all pixels are alike: no camera that sees a gel delivers that
-  /// Less of the picture is at rest than the settings ask for: the light has changed, it's another unit's background,
-  /// or the contact is all over. Nothing then tells height from light.
+  /// Less of the picture is at rest than the settings ask for, where its border is to be: the light has changed, it's
+  /// another unit's background, or the contact is all over. Never with HeightBorder::free, which is for such contacts.
   bool unlike = false;
   bool contact_at_border = false;  ///< the contact runs out of the picture: use HeightBorder::free, and mind the level
 

@@ -127,6 +127,8 @@ TEST_F(Drifting, AnotherUnitsFramesAreNotTrusted) {
   EXPECT_TRUE(result.unlike);
   EXPECT_FALSE(result.trusted());
   EXPECT_LT(result.rest_share, 0.05);
+  HeightEstimator free(model_, {.border = HeightBorder::free});
+  EXPECT_TRUE(free.estimate(other.rest()).trusted()) << "contacts all over are what it's for";
 }
 
 TEST_F(Drifting, AScratchIsTakenOutByNewRestFrames) {
