@@ -138,31 +138,6 @@ struct NoiseSum {
   double root() const { return values == 0 ? 0.0 : std::sqrt(std::max(0.0, squares / static_cast<double>(values))); }
 };
 
-/// Adds up squares of the noise of paths over the imager's, from pictures by two sets of random numbers.
-struct PathNoiseSum {
-  double squares = 0.0;
-  std::int64_t values = 0;
-
-  void add(const TwoPictures& both, const cv::Mat& mask, const std::vector<render::ImagerResponse>& responses) {
-    const int channels = static_cast<int>(responses.size());
-    for (int row = 0; row < mask.rows; ++row) {
-      for (int column = 0; column < mask.cols; ++column) {
-        if (mask.at<std::uint8_t>(row, column) == 0) continue;
-        for (int c = 0; c < channels; ++c) {
-          const int i = column * channels + c;
-          const render::ImagerResponse& response = responses[static_cast<std::size_t>(c)];
-          const double level = 0.5 * (both[0].ptr<float>(row)[i] + both[1].ptr<float>(row)[i]);
-          if (level >= response.full_well_e) continue;
-          const double difference = both[0].ptr<float>(row)[i] - both[1].ptr<float>(row)[i];
-          squares += 0.5 * std::pow(difference / render::noise_e(response, level), 2);
-          ++values;
-        }
-      }
-    }
-  }
-  double root() const { return values == 0 ? 0.0 : std::sqrt(squares / static_cast<double>(values)); }
-};
-
 /// mm: how far the surface's height differs at most with the fine contact and without. @pre `view` has it
 double height_change(const SceneView& view, const fem::PressState& press) {
   const cv::Mat fine = view.membrane->height(press, view.relief(press));
@@ -187,10 +162,16 @@ void add_picture_needs(const SceneSpec& scene, const Plan& plan, const fem::Comp
     planned.push_back(seen_state(view, camera, press, masks.back(), settings.paths, responses));
   }
   if (scene.outputs.light() && !plan.direct_light && !plan.shared_paths) {
-    PathNoiseSum noise;
-    for (std::size_t k = 0; k < frames.size(); ++k) noise.add(planned[k].electrons, masks[k], responses);
-    const double with_most = noise.root() * std::sqrt(static_cast<double>(settings.paths) / limits.max_samples);
-    needs.push_back({kMorePaths, Change{.pixel_noise = std::max(limits.noise_fraction, with_most)}, {}});
+    NoiseSum twice;  // of the difference of two pictures, which has two pictures' noise
+    for (std::size_t k = 0; k < frames.size(); ++k) {
+      const auto& [one, other] = planned[k].electrons;
+      twice.add({one, one}, {other, other}, masks[k], responses);
+    }
+    const double with_most =
+        twice.root() / std::sqrt(2.0) * std::sqrt(static_cast<double>(settings.paths) / limits.max_samples);
+    EffectNeed need{kMorePaths, {}, {}};
+    need.change.emplace().pixel_noise = std::max(limits.noise_fraction, with_most);
+    needs.push_back(std::move(need));
   }
   for (const SwitchedEffect& one : kSeenEffects) {
     const std::optional<SwitchedScene> way = switched(scene, plan, one);
