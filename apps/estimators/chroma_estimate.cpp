@@ -34,6 +34,7 @@ void estimate(const EstimateOptions& options, const SourceOptions& source, const
   const lab::FieldSummary summary =
       lab::write_chroma_fields(model, grid, options.rest, opened_streams(source), forces, options.out, bar.listener());
   warn_of_faults(summary.faults);
+  warn_of_notes(source);
   fmt::print("{}: displacements.csv{} of {} frames\n", options.out.string(), forces ? " and forces.csv" : "",
              summary.frames - std::ssize(summary.faults));
   fmt::print("  {} of {} markers measured, {} of them beyond what calibration saw\n", summary.measured, summary.markers,

@@ -25,6 +25,7 @@ void estimate(const EstimateOptions& options, const SourceOptions& source, const
       lab::write_darkness_maps(model, opened_streams(source), options.out, format, options.doubt, bar.listener());
   const std::vector<std::string> faults = lab::faults_of(records);
   warn_of_faults(faults);
+  warn_of_notes(source);
   const auto count = [&](auto fault) { return std::count_if(records.begin(), records.end(), fault); };
   const auto untrusted =
       count([](const lab::DarknessRecord& record) { return !record.trusted && record.fault.empty(); });

@@ -68,6 +68,7 @@ void estimate(const EstimateOptions& options, const SourceOptions& source, const
       lab::write_height_maps(model, settings, opened_streams(source), options.out, format, bar.listener(), show);
   const std::vector<std::string> faults = lab::faults_of(records);
   warn_of_faults(faults);
+  warn_of_notes(source);
   const auto count = [&](auto fault) { return std::count_if(records.begin(), records.end(), fault); };
   const auto untrusted = count([](const lab::HeightRecord& record) { return !record.trusted && record.fault.empty(); });
   const auto at_border = count([](const lab::HeightRecord& record) { return record.contact_at_border; });

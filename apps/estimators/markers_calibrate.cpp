@@ -32,6 +32,7 @@ void calibrate(const CalibrateOptions& options, const MarkerOptions& frames, con
   }
   sensors::save(made.fit.model, options.out);
   warn_of_faults(made.faults);
+  warn_of_notes(*frames.source);
   fmt::print("{}: forces of {} frames in contact, of {}\n", options.out.string(), made.samples, made.frames);
   const auto& [x, y, z] = made.fit.left_out_N;
   if (!made.fit.model.normal.empty()) {

@@ -70,6 +70,7 @@ void estimate(const EstimateOptions& options, const MarkerOptions& chosen, const
     ProgressBar bar(global.quiet);
     tracks = lab::write_marker_tracks(opened_streams(*chosen.source), settings, options.out, bar.listener());
   }
+  warn_of_notes(*chosen.source);
   std::int64_t frames = 0;
   for (const lab::MarkerTrack& track : tracks) {
     warn_of_faults(track.faults);

@@ -37,6 +37,7 @@ void calibrate(const CalibrateOptions& options, const SurfaceOptions& surfaces, 
     if (!record.fault.empty()) faults.push_back(record.fault);
   }
   warn_of_faults(faults);
+  warn_of_notes(*surfaces.frames);
   const sensors::TactileMapData& data = map.data();
   fmt::print("{}: a map of {} of {} touches, {:.1f} x {:.1f} mm\n", options.out.string(), data.touches, records.size(),
              data.height_mm.cols * data.frame.mm_per_px, data.height_mm.rows * data.frame.mm_per_px);

@@ -34,6 +34,7 @@ void estimate(const EstimateOptions& options, const SurfaceOptions& surfaces, co
     found += record.fault.empty() && record.found.localised() ? 1 : 0;
   }
   warn_of_faults(faults);
+  warn_of_notes(*surfaces.frames);
   fmt::print("{}: the places of {} of {} touches\n", options.out.string(), found, records.size());
 }
 

@@ -2,8 +2,13 @@
 
 #include <signal.h>
 
+#include <fmt/ranges.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
 #include <atomic>
 #include <filesystem>
+#include <utility>
 
 namespace touchstone::apps {
 namespace {
@@ -67,7 +72,23 @@ std::vector<datasets::FrameStream> opened_streams(const SourceOptions& options) 
     stop_frames_by_signal();
     choice.stopped = [] { return stop_asked.load(); };
   }
-  return datasets::streams_of(choice);
+  std::vector<datasets::FrameStream> streams = datasets::streams_of(choice);
+  for (datasets::FrameStream& stream : streams) stream = datasets::watched(std::move(stream), options.notes);
+  return streams;
+}
+
+void warn_of_notes(const SourceOptions& options) {
+  constexpr std::size_t kMostNamed = 5;
+  const auto some_of = [&](const std::vector<std::string>& notes, const char* between) {
+    const std::vector<std::string> some(notes.begin(), notes.begin() + std::min(notes.size(), kMostNamed));
+    return fmt::format("{}{}", fmt::join(some, between), notes.size() > kMostNamed ? ", and so on" : "");
+  };
+  const auto& [doubled, gaps] = *options.notes;
+  if (!doubled.empty()) {
+    spdlog::warn("{} frame{} the very picture of the one before, as when a recorder doubles it: {}", doubled.size(),
+                 doubled.size() == 1 ? " has" : "s have", some_of(doubled, ", "));
+  }
+  if (!gaps.empty()) spdlog::warn("frames were dropped at {} places: {}", gaps.size(), some_of(gaps, "; "));
 }
 
 std::string name_of_source(const SourceOptions& options) {

@@ -7,6 +7,7 @@
 
 #include "apps/command.h"
 #include "datasets/sources/any_source.h"
+#include "datasets/sources/frame_watch.h"
 
 namespace touchstone::apps {
 
@@ -14,6 +15,7 @@ namespace touchstone::apps {
 struct SourceOptions {
   datasets::SourceChoice choice;
   std::string split;  ///< of a data set: "all" or a split's name
+  std::shared_ptr<datasets::FrameNotes> notes = std::make_shared<datasets::FrameNotes>();  ///< of opened_streams
 };
 
 /// What else a command asks of its source.
@@ -31,6 +33,9 @@ std::shared_ptr<SourceOptions> add_source_options(CLI::App& command, const std::
 /// The streams that the options name. Of a live source Ctrl-C then ends the frames, not the program; a second one does.
 /// @throws Error as datasets::streams_of
 std::vector<datasets::FrameStream> opened_streams(const SourceOptions& options);
+
+/// Warns of frames that were doubled or dropped before they came here; of many it names some.
+void warn_of_notes(const SourceOptions& options);
 
 /// The place as it was given, without slashes at its end: for names.
 std::string name_of_source(const SourceOptions& options);

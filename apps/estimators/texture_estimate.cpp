@@ -36,6 +36,7 @@ void estimate(const EstimateOptions& options, const SurfaceOptions& surfaces, co
     }
   }
   warn_of_faults(faults);
+  warn_of_notes(*surfaces.frames);
   fmt::print("{}: materials of {} height maps\n", options.out.string(), records.size() - faults.size());
   for (const auto& [material, count] : counts) fmt::print("  {}: {}\n", material, count);
 }

@@ -45,6 +45,7 @@ std::vector<lab::TrackedSequence> tracked_frames(
     ProgressBar bar(global.quiet);
     tracked = lab::track(streams, settings, bar.listener(), show);
   }
+  warn_of_notes(*options.source);
   for (const lab::TrackedSequence& sequence : tracked) {
     warn_of_faults(sequence.faults);
     if (sequence.lost() > 0) {
