@@ -2,19 +2,14 @@
 
 #include <fmt/format.h>
 #include <httplib.h>
-#include <sys/socket.h>
 
 #include <atomic>
-#include <cerrno>
 #include <condition_variable>
-#include <cstring>
 #include <mutex>
-#include <thread>
 #include <utility>
 
 #include "apps/jpeg_answers.h"
-#include "apps/whole_request_server.h"
-#include "core/error.h"
+#include "apps/listening_server.h"
 #include "plots/line_plot.h"
 #include "render/imager/jpeg.h"
 
@@ -26,12 +21,6 @@ constexpr int kThreads = 8;
 constexpr double kPatience_s = 10.0;
 constexpr int kQuality = 85;
 constexpr const char* kAddress = "127.0.0.1";
-
-/// httplib's own way shares a port between servers.
-void keep_port(int socket) {
-  const int yes = 1;
-  setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-}
 
 std::string live_page(const std::string& title) {
   const std::string name = plots::escape_markup(title);
@@ -79,10 +68,7 @@ struct LiveView::Parts {
   }
 
   const std::string title;
-  WholeRequestServer server;
-  int port = 0;
-  std::thread listener;
-  std::atomic<bool> listened{false};
+  ListeningServer server;
   std::mutex mutex;
   std::condition_variable shown;
   cv::Mat last;  // not changed any more: the next one has memory of its own
@@ -95,7 +81,7 @@ struct LiveView::Parts {
 
 LiveView::LiveView(std::string title, int port) : parts_(std::make_unique<Parts>(std::move(title))) {
   Parts* const parts = parts_.get();
-  parts->server.set_socket_options(&keep_port);
+  parts->server.set_socket_options(&ListeningServer::keep_port);
   parts->server.set_pre_routing_handler([](const httplib::Request& request, httplib::Response& response) {
     using Handled = httplib::Server::HandlerResponse;
     return request_may_go_on(request, response, {}) ? Handled::Unhandled : Handled::Handled;
@@ -108,19 +94,7 @@ LiveView::LiveView(std::string title, int port) : parts_(std::make_unique<Parts>
       answer_error(response, response.status, "there are only /, /frame.jpg and /stream.mjpg");
     }
   });
-  errno = 0;
-  parts->port =
-      port == 0 ? parts->server.bind_to_any_port(kAddress) : (parts->server.bind_to_port(kAddress, port) ? port : -1);
-  if (parts->port <= 0) {
-    fail("--live: can't listen at {}:{}{}; another port may be free, 0 takes any", kAddress, port,
-         errno == 0 ? std::string() : fmt::format(": {}", std::strerror(errno)));
-  }
-  parts->listener = std::thread([parts] {
-    parts->server.listen_after_bind();
-    parts->listened = true;
-  });
-  // Before it runs, stop() wouldn't stop it.
-  while (!parts->server.is_running() && !parts->listened) std::this_thread::yield();
+  parts->server.begin(kAddress, port, {"--live: ", "another port may be free, 0 takes any"});
 }
 
 LiveView::~LiveView() {
@@ -129,12 +103,11 @@ LiveView::~LiveView() {
     parts_->ended = true;
   }
   parts_->shown.notify_all();
-  parts_->server.stop();
-  parts_->listener.join();
+  parts_->server.end();
 }
 
 int LiveView::port() const {
-  return parts_->port;
+  return parts_->server.port();
 }
 
 void LiveView::show(const cv::Mat& picture) {
