@@ -11,21 +11,17 @@ namespace touchstone::sim {
 namespace {
 
 /// Where the mesh alone is off by more than is allowed.
-void warn_of_mesh(const SceneSpec& scene, const SceneNeeds& needs, Plan& plan) {
-  const std::optional<AccuracySpec> stated = merged(scene.accuracy, scene.device.accuracy);
+std::string mesh_doubt(const SceneSpec& scene, const SceneNeeds& needs, const Accuracy& allowed) {
   const Change* finer = change_of(needs, kFinerMesh);
-  if (!stated || finer == nullptr) return;
-  const Accuracy allowed = *accuracy_of(scene.accuracy, scene.device.accuracy);
-  if (!exceeds(*finer, allowed)) return;
+  if (finer == nullptr || !exceeds(*finer, allowed)) return {};
   const MeshSpec& mesh = scene.device.mesh;
-  const std::string words = fmt::format(
+  return fmt::format(
       "accuracy.force_percent is {:.3g}, but the mesh itself is off by {:.2g} % of a force (one standard error, in the "
       "hardest states): that is the least to be had with {}; smaller edges give less, or `mesh.force_error: {:.2g}`",
       allowed.force_percent, *finer->force_percent,
       mesh.force_error ? fmt::format("mesh.force_error of {:.2g}", *mesh.force_error)
                        : fmt::format("edges of {:.3g} mm", mesh.fine_mm),
       0.01 * allowed.force_percent);
-  plan.warnings.emplace_back(Error(stated->where, words).what());
 }
 
 /// A large number as people say it.
@@ -35,25 +31,21 @@ std::int64_t two_digits(double number) {
 }
 
 /// The same where as many paths as are allowed leave more noise than is.
-void warn_of_paths(const SceneSpec& scene, const SceneNeeds& needs, Plan& plan) {
-  const std::optional<AccuracySpec> stated = merged(scene.accuracy, scene.device.accuracy);
+std::string path_doubt(const SceneSpec& scene, const SceneNeeds& needs, const Accuracy& allowed, const Plan& plan) {
   const Change* more = change_of(needs, kMorePaths);
-  if (!stated || more == nullptr || !more->pixel_noise || plan.direct_light || plan.shared_paths) return;
-  const Accuracy allowed = *accuracy_of(scene.accuracy, scene.device.accuracy);
-  if (!exceeds(*more, allowed)) return;
+  if (more == nullptr || !more->pixel_noise || plan.direct_light || plan.shared_paths) return {};
+  if (!exceeds(*more, allowed)) return {};
   const LightLimits limits = light_limits(scene);
   const double left = *more->pixel_noise;
-  const std::string words =
-      left > limits.noise_fraction
-          ? fmt::format(
-                "accuracy.pixel_noise is {:.3g}, but {} paths a pixel leave some {:.2g} of the imager's noise in "
-                "the hardest states: that is the least to be had with light.max_samples of {}; some {} take "
-                "as much longer and would do",
-                allowed.pixel_noise, limits.max_samples, left, limits.max_samples,
-                two_digits(limits.max_samples * std::pow(left / limits.noise_fraction, 2)))
-          : fmt::format("accuracy.pixel_noise is {:.3g}, but light.noise_fraction of {:.3g} leaves more",
-                        allowed.pixel_noise, limits.noise_fraction);
-  plan.warnings.emplace_back(Error(stated->where, words).what());
+  if (left <= limits.noise_fraction) {
+    return fmt::format("accuracy.pixel_noise is {:.3g}, but light.noise_fraction of {:.3g} leaves more",
+                       allowed.pixel_noise, limits.noise_fraction);
+  }
+  return fmt::format(
+      "accuracy.pixel_noise is {:.3g}, but {} paths a pixel leave some {:.2g} of the imager's noise in the hardest "
+      "states: that is the least to be had with light.max_samples of {}; some {} take as much longer and would do",
+      allowed.pixel_noise, limits.max_samples, left, limits.max_samples,
+      two_digits(limits.max_samples * std::pow(left / limits.noise_fraction, 2)));
 }
 
 }  // namespace
@@ -63,8 +55,12 @@ void add_warnings(const SceneSpec& scene, const SceneNeeds& needs, Plan& plan) {
     std::string doubt = size_doubt(scene.device, moved.object);
     if (!doubt.empty()) plan.warnings.push_back(std::move(doubt));
   }
-  warn_of_mesh(scene, needs, plan);
-  warn_of_paths(scene, needs, plan);
+  const std::optional<AccuracySpec> stated = merged(scene.accuracy, scene.device.accuracy);
+  if (!stated) return;
+  const Accuracy allowed = *accuracy_of(scene.accuracy, scene.device.accuracy);
+  for (const std::string& doubt : {mesh_doubt(scene, needs, allowed), path_doubt(scene, needs, allowed, plan)}) {
+    if (!doubt.empty()) plan.warnings.emplace_back(Error(stated->where, doubt).what());
+  }
 }
 
 }  // namespace touchstone::sim

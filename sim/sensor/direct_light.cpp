@@ -80,11 +80,12 @@ double lit_radius(const GelSpec& gel, const Eigen::AlignedBox3d& reach) {
   return far.maxCoeff();
 }
 
-/// What is allowed, and what paths would leave, of light that isn't within it; empty of light that is.
+/// Of light that isn't within its limit: what that is, and what paths would leave where that was measured.
 std::string beside_the_limit(const LightLimits& limits, const render::DirectChoice& chosen) {
-  if (!chosen.paths_noise) return {};
-  return fmt::format("; allowed are {}, and {} paths a pixel would leave some {:.2g}", direct_limit_in_words(limits),
-                     limits.max_samples, *chosen.paths_noise);
+  std::string words = fmt::format("; allowed are {}", direct_limit_in_words(limits));
+  if (chosen.paths_noise)
+    words += fmt::format(", and {} paths a pixel would leave some {:.2g}", limits.max_samples, *chosen.paths_noise);
+  return words;
 }
 
 std::string with_figures(const std::string& verdict, const render::DirectChoice& chosen) {
@@ -181,18 +182,15 @@ DirectLight::DirectLight(const SceneView& view, const render::Camera& camera, st
   if (chosen.error.pixels > 0) choice_.error = chosen.error;
   if (!chosen.renderer) {
     if (forced) fail_at(scene.where, "effects.direct_light: on, but {}", chosen.reason);
-    const LightLimits limits = light_limits(scene);
-    choice_.reason = !choice_.error       ? fmt::format("paths: {}", chosen.reason)
-                     : chosen.paths_noise ? with_figures("paths", chosen) + beside_the_limit(limits, chosen)
-                                          : fmt::format("{}; allowed are {}", with_figures("paths", chosen),
-                                                        direct_limit_in_words(limits));
+    choice_.reason = choice_.error ? with_figures("paths", chosen) + beside_the_limit(light_limits(scene), chosen)
+                                   : fmt::format("paths: {}", chosen.reason);
     return;
   }
   choice_.direct = true;
   const int rays = settings.direct.samples = chosen.samples;
   choice_.reason =
-      with_figures(rays == 1 ? "direct light" : fmt::format("direct light of {} rays a pixel", rays), chosen) +
-      beside_the_limit(light_limits(scene), chosen);
+      with_figures(rays == 1 ? "direct light" : fmt::format("direct light of {} rays a pixel", rays), chosen);
+  if (chosen.paths_noise) choice_.reason += beside_the_limit(light_limits(scene), chosen);  // nothing was within it
   settings_ = settings.direct;
   rest_ = asked.rest;
   rest_.interreflection = false;
