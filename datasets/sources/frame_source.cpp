@@ -34,6 +34,10 @@ class PictureFrames : public FrameSource {
 
 }  // namespace
 
+std::string name_in_table(const SourceFrame& frame) {
+  return (std::filesystem::path(frame.stem).parent_path() / frame.label.file.filename()).string();
+}
+
 SourceFrame first_frame(FrameSource& source, const std::string& name) {
   SourceFrame frame;
   if (!source.next(frame)) fail("{}: has no frame", name);

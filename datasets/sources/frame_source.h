@@ -69,6 +69,9 @@ void for_each_frame(const std::vector<FrameStream>& streams, const Act& act) {
   }
 }
 
+/// What a table of frames calls one of them: the file's name, with its sequence before it where there are several.
+std::string name_in_table(const SourceFrame& frame);
+
 /// The first frame of a source. @throws Error if it has none, or its fault
 SourceFrame first_frame(FrameSource& source, const std::string& name);
 

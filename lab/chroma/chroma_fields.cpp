@@ -148,8 +148,7 @@ FieldSummary write_chroma_fields(const sensors::HueModel& model, const Eigen::Ve
   const std::int64_t total = datasets::frames_of(streams);
   FieldSummary summary;
   datasets::for_each_frame(streams, [&](const datasets::SourceFrame& frame) {
-    const std::string name =
-        datasets::csv_cell((fs::path(frame.stem).parent_path() / frame.label.file.filename()).string());
+    const std::string name = datasets::csv_cell(datasets::name_in_table(frame));
     std::string lines, force_line;
     std::string fault = datasets::fault_on_frame(frame, [&](const cv::Mat& image) {
       const sensors::ColourMarkerReading& reading = finder.find(image);

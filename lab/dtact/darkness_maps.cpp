@@ -63,7 +63,7 @@ std::vector<DarknessRecord> write_darkness_maps(const sensors::DarknessModel& mo
       result = &estimator.estimate(image);
       record = record_of(*result, pixel_mm2);
     });
-    record.file = name_in_table(frame);
+    record.file = datasets::name_in_table(frame);
     if (fault.empty()) {
       write_height_map(result->height_mm, folder / (frame.stem + ".png"), format);
       if (doubt) sim::write_png(folder / (frame.stem + "-doubt.png"), result->doubt);

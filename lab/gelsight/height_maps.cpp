@@ -45,11 +45,6 @@ void write_height_map(const cv::Mat& height_mm, fs::path file, HeightFormat form
       {{"mm_per_level", fmt::format("{}", 1.0 / kLevelsPerMm)}, {"zero_level", fmt::format("{}", kZeroLevel)}});
 }
 
-std::string name_in_table(const datasets::SourceFrame& frame) {
-  const fs::path folder = fs::path(frame.stem).parent_path();
-  return (folder / frame.label.file.filename()).string();
-}
-
 std::vector<HeightRecord> write_height_maps(
     const sensors::HeightModel& model, const sensors::HeightSettings& settings,
     const std::vector<datasets::FrameStream>& streams, const fs::path& folder, HeightFormat format,
@@ -62,7 +57,7 @@ std::vector<HeightRecord> write_height_maps(
   std::vector<HeightRecord> records;
   datasets::for_each_frame(streams, [&](const datasets::SourceFrame& frame) {
     HeightRecord record;
-    record.file = name_in_table(frame);
+    record.file = datasets::name_in_table(frame);
     cv::Mat height_mm;
     record.fault = datasets::fault_on_frame(frame, [&](const cv::Mat& image) {
       const sensors::HeightResult& result = estimator.estimate(image);

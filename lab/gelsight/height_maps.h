@@ -56,7 +56,4 @@ std::vector<HeightRecord> write_height_maps(
     const Progress& progress = {},
     const std::function<void(const datasets::SourceFrame& frame, const sensors::HeightResult& result)>& show = {});
 
-/// What a table of frames calls one of them: the file's name, with its sequence before it where there are several.
-std::string name_in_table(const datasets::SourceFrame& frame);
-
 }  // namespace touchstone::lab

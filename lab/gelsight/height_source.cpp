@@ -8,7 +8,6 @@
 #include "core/error.h"
 #include "core/natural_order.h"
 #include "datasets/inspection/on_picture.h"
-#include "lab/gelsight/height_maps.h"
 #include "sim/files/image_file.h"
 
 namespace touchstone::lab {
@@ -75,7 +74,7 @@ bool HeightSource::next(SourceHeights& map) {
     }
     datasets::SourceFrame frame;
     if (open_->next(frame)) {
-      map.file = name_in_table(frame);
+      map.file = datasets::name_in_table(frame);
       map.title = frame.title;
       map.fault = datasets::fault_on_frame(frame, [&](const cv::Mat& image) { map.height_mm = estimated(image); });
       return true;
