@@ -6,6 +6,7 @@
 #include "core/error.h"
 #include "core/whole_file.h"
 #include "datasets/inspection/contact_sheet.h"
+#include "datasets/inspection/estimate_page.h"
 #include "datasets/inspection/inspected_draw.h"
 #include "datasets/inspection/inspection_page.h"
 #include "datasets/sources/frame_sequence.h"
@@ -18,6 +19,7 @@ struct InspectOptions {
   std::filesystem::path data;
   std::filesystem::path out;
   std::filesystem::path job;
+  std::filesystem::path overlay;
   int columns = 6;
   int tiles_per_scene = 6;
   int tile_width = 240;
@@ -90,10 +92,36 @@ void write_sheet(const InspectOptions& options) {
   fmt::print("{}: {} frames with their forces x, y, z on the object\n", options.out.string(), pictures.size());
 }
 
+/// Is it what a `touchstone estimate` wrote, and no data set?
+bool holds_estimates(const std::filesystem::path& place) {
+  if (std::filesystem::is_directory(place)) return !std::filesystem::exists(place / "dataset.json");
+  return place.extension() == ".csv";
+}
+
+void write_report(const InspectOptions& options) {
+  if (options.out.extension() != ".html") fail("{}: the report of estimates is an .html file", options.out.string());
+  if (!options.job.empty()) fail("--job: is for a data set, and {} holds estimates", options.data.string());
+  const std::filesystem::path place = options.data.lexically_normal();
+  const std::vector<datasets::EstimateTable> tables = datasets::estimate_tables(place);
+  const bool is_folder = std::filesystem::is_directory(place);
+  std::filesystem::path overlay = options.overlay;
+  if (overlay.empty()) overlay = (is_folder ? place : place.parent_path()) / "overlay";
+  const std::vector<std::filesystem::path> pictures = datasets::pictures_below(overlay);
+  if (!options.overlay.empty() && pictures.empty()) fail("--overlay: {} holds no pictures", overlay.string());
+  datasets::EstimatePageOptions how;
+  how.tile_width = options.tile_width;
+  const std::filesystem::path named = place.has_filename() ? place : place.parent_path();
+  write_whole_file(options.out, datasets::estimate_page(named.filename().string(), tables, pictures, how));
+  fmt::print("{}: {} table{}{}\n", options.out.string(), tables.size(), tables.size() == 1 ? "" : "s",
+             pictures.empty() ? "" : fmt::format(", pictures of {}", overlay.string()));
+}
+
 void inspect(const InspectOptions& options) {
+  require_writable_place(options.out);
+  if (holds_estimates(options.data)) return write_report(options);
+  if (!options.overlay.empty()) fail("--overlay: is for estimates, and {} is a data set", options.data.string());
   const auto ending = options.out.extension();
   if (ending != ".png" && ending != ".html") fail("{}: the name must end in .html or .png", options.out.string());
-  require_writable_place(options.out);
   ending == ".html" ? write_page(options) : write_sheet(options);
 }
 
@@ -102,14 +130,21 @@ void inspect(const InspectOptions& options) {
 void add_inspect_command(CLI::App& app, const GlobalOptions&, Action& action) {
   CLI::App* command = app.add_subcommand(
       "inspect",
-      "Look at a data set: a page with frames, truth, histograms and a view in 3D, or a sheet of its frames");
+      "Look at a data set: a page with frames, truth, histograms and a view in 3D, or a sheet of its frames; or at "
+      "estimates: a report with curves, errors, contact and slip, doubtful frames");
   auto options = std::make_shared<InspectOptions>();
-  command->add_option("DIR", options->data, "A data set that `touchstone generate` made")->required();
+  command
+      ->add_option("DIR", options->data,
+                   "A data set that `touchstone generate` made; or a folder or .csv file that an "
+                   "estimate wrote")
+      ->required();
   command
       ->add_option("-o,--out", options->out,
                    "The page, an .html file that needs nothing else, or the sheet, a .png file")
       ->required();
   command->add_option("--job", options->job, "The job that the set was made of (default: the shipped one of its name)");
+  command->add_option("--overlay", options->overlay,
+                      "Of estimates: the folder of pictures to show (default: 'overlay' beside the tables)");
   command->add_option("--per-scene", options->tiles_per_scene, "Frames of each scene, spread evenly over it")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();

@@ -15,6 +15,8 @@ struct PlotCurve {
   std::vector<std::pair<double, double>> points;
   bool dashed = false;                     ///< for theory: no marks
   bool joined = true;                      ///< by lines
+  bool marked = true;                      ///< each point by a dot; not where there are hundreds
+  std::vector<double> spread = {};         ///< of each point, up and down: a band behind the curve; or none
   std::optional<std::size_t> colour = {};  ///< number in the palette of six; none: as the curves' order
   std::vector<std::string> labels = {};    ///< beside the points, in their order, where no other label is; or none
 };

@@ -1,7 +1,5 @@
 #include "datasets/inspection/inspection_page.h"
 
-#include <openssl/evp.h>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -9,37 +7,19 @@
 
 #include "core/error.h"
 #include "datasets/inspection/contact_sheet.h"
+#include "datasets/inspection/page_parts.h"
 #include "datasets/inspection/truth_overlay.h"
 #include "datasets/jobs/scenes_folder.h"
 #include "datasets/sets/run_identity.h"
 #include "plots/histogram_plot.h"
 #include "plots/line_plot.h"
-#include "render/imager/jpeg.h"
 #include "sim/files/image_file.h"
 
 namespace touchstone::datasets {
 namespace {
 
-constexpr int kJpegQuality = 90;
 constexpr std::size_t kMostPoints = 300;  // of a curve
 constexpr std::size_t kMostCurves = 6;
-
-constexpr const char* kPageStyle = R"(
-body { font-family: sans-serif; margin: 2em auto; max-width: 82em; padding: 0 1em; color: #222; background: #fff; }
-h1 { margin-bottom: 0.2em; } h2 { margin-top: 1.6em; border-bottom: 1px solid #ccc; }
-table { border-collapse: collapse; font-size: 0.9em; margin: 0.6em 0; }
-th, td { text-align: left; padding: 0.25em 0.7em; border-bottom: 1px solid #ddd; vertical-align: top; }
-th { border-bottom: 2px solid #888; }
-td.number { text-align: right; font-variant-numeric: tabular-nums; }
-td:first-child { white-space: nowrap; }
-.wide { overflow-x: auto; }
-tr.off { color: #777; }
-img, svg { max-width: 100%; height: auto; }
-figure { display: inline-block; margin: 0.4em; vertical-align: top; } figcaption { font-size: 0.85em; }
-#view { width: 100%; height: 32em; background: #eef; }
-pre { background: #f6f6f6; padding: 0.8em; overflow-x: auto; font-size: 0.85em; }
-.note { color: #555; font-size: 0.9em; overflow-wrap: anywhere; }
-)";
 
 // What the page does with three.js: turns the model that stands in it as base64 into a view to be turned by mouse.
 constexpr const char* kViewerCode = R"(
@@ -97,53 +77,6 @@ constexpr const char* kViewerCode = R"(
   }, function (error) { place.textContent = "The model can't be shown: " + error; });
 })();
 )";
-
-std::string base64(const std::string& bytes) {
-  std::string text(4 * ((bytes.size() + 2) / 3) + 1, '\0');  // OpenSSL ends it by a zero
-  TS_ASSERT(bytes.size() < (std::size_t{1} << 30));
-  const int length =
-      EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()),
-                      reinterpret_cast<const unsigned char*>(bytes.data()), static_cast<int>(bytes.size()));
-  text.resize(static_cast<std::size_t>(length));
-  return text;
-}
-
-std::string picture_element(const cv::Mat& picture, const std::string& caption) {
-  const std::string words = plots::escape_markup(caption);
-  return fmt::format(
-      "<figure><img width=\"{}\" height=\"{}\" alt=\"{}\" src=\"data:image/jpeg;base64,{}\"><figcaption>{}</figcaption>"
-      "</figure>\n",
-      picture.cols, picture.rows, words, base64(render::jpeg_bytes(picture, {.quality = kJpegQuality})), words);
-}
-
-std::string cell(const std::string& text, const char* kind = "td") {
-  return fmt::format("<{0}>{1}</{0}>", kind, plots::escape_markup(text));
-}
-
-std::string number_cell(double value) {
-  return fmt::format("<td class=\"number\">{:.4g}</td>", value);
-}
-
-/// A table that is scrolled by itself where it's wider than the page. @param head of its columns
-std::string table(const std::vector<std::string>& head, const std::string& rows) {
-  std::string html = "<div class=\"wide\"><table>";
-  if (!head.empty()) {
-    html += "<tr>";
-    for (const std::string& name : head) html += cell(name, "th");
-    html += "</tr>\n";
-  }
-  return html + rows + "</table></div>\n";
-}
-
-/// `count` numbers spread evenly over `first` ... `first + size - 1`, both ends among them.
-std::vector<std::size_t> spread_over(std::size_t first, std::size_t size, std::size_t count) {
-  std::vector<std::size_t> chosen;
-  count = std::min(size, count);
-  for (std::size_t i = 0; i < count; ++i) {
-    chosen.push_back(first + (count == 1 ? size - 1 : i * (size - 1) / (count - 1)));
-  }
-  return chosen;
-}
 
 std::string force_words(const InspectedSample& sample) {
   return fmt::format("{:.2f} {:.2f} {:.2f} N", sample.wrench[0], sample.wrench[1], sample.wrench[2]);
@@ -433,10 +366,7 @@ std::optional<PreparedJob> job_of_set(const InspectedSet& set, const std::filesy
 
 std::string inspection_page(const InspectedSet& set, const std::optional<PreparedJob>& job, const std::string& note,
                             const std::optional<ViewerScripts>& viewer, const InspectionOptions& options) {
-  const std::string title = plots::escape_markup(set.job_name);
-  std::string html = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>" + title +
-                     "</title>\n<style>" + kPageStyle +
-                     "</style>\n<link rel=\"icon\" href=\"data:,\">\n</head>\n<body>\n<h1>" + title + "</h1>\n";
+  std::string html = page_begin(set.job_name);
   html += fmt::format(
       "<p class=\"note\">{} samples in {} {}, {} files, {:.1f} MB. touchstone {} on {}. Content SHA-256 {}</p>\n",
       set.samples.size(), set.scenes.size(), set.drawn ? "units" : "scenes", set.files,
@@ -468,7 +398,7 @@ std::string inspection_page(const InspectedSet& set, const std::optional<Prepare
   }
   section(set.drawn ? "Arrays of each block" : "Arrays of truth.h5", array_table(set));
   section("Job", "<pre>" + plots::escape_markup(set.job_text) + "</pre>\n");
-  return html + "</body>\n</html>\n";
+  return html + page_end();
 }
 
 }  // namespace touchstone::datasets
