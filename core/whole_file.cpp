@@ -117,6 +117,10 @@ void WholeFileWriter::append(std::string_view content) {
   parts_->waiting.clear();
 }
 
+const std::filesystem::path& WholeFileWriter::temporary() const {
+  return parts_->file.name();
+}
+
 void WholeFileWriter::finish() {
   parts_->file.append(parts_->waiting);
   parts_->file.take_its_name();

@@ -19,6 +19,8 @@ class WholeFileWriter {
 
   /// @throws Error that names `path`, as where the disk is full
   void append(std::string_view content);
+  /// What is written until finish() gives it its name: for a library that writes to a file by its name.
+  const std::filesystem::path& temporary() const;
   /// Gives the file its name. @pre once, at the end
   void finish();
 

@@ -33,7 +33,7 @@ sensors/models: core
 sensors/learning: core sensors/numerics sensors/models
 sensors/image: core sensors/numerics
 sensors/beads: core sensors/numerics sensors/models sensors/image
-sensors/heights: core sensors/numerics sensors/models sensors/learning
+sensors/heights: core sensors/numerics sensors/models sensors/learning sensors/image
 sensors/touch_map: core sensors/models
 sensors/texture: core sensors/models sensors/image
 sensors/markers: core sensors/models sensors/image sensors/heights

@@ -2,10 +2,12 @@
 #include <memory>
 
 #include "apps/command.h"
+#include "apps/estimators/overlay_sink.h"
 #include "apps/estimators/source_options.h"
 #include "apps/progress_bar.h"
 #include "lab/dtact/darkness_maps.h"
 #include "sensors/heights/darkness_model_file.h"
+#include "sensors/heights/height_overlay.h"
 
 namespace touchstone::apps {
 namespace {
@@ -15,14 +17,26 @@ struct EstimateOptions {
   std::filesystem::path out;
   std::string format = "exr";
   bool doubt = false;
+  bool overlay = false;
 };
 
-void estimate(const EstimateOptions& options, const SourceOptions& source, const GlobalOptions& global) {
+void estimate(const EstimateOptions& options, const SourceOptions& source, const PictureOptions& pictures,
+              const GlobalOptions& global) {
   const sensors::DarknessModel model = sensors::load_darkness_model(options.model);
   const lab::HeightFormat format = options.format == "exr" ? lab::HeightFormat::exr : lab::HeightFormat::png16;
+  OverlaySink sink(pictures, options.overlay ? options.out / "overlay" : "", "heights of " + source.choice.place);
+  lab::ShownDarkness show;
+  if (sink.wanted()) {
+    show = [&sink, picture = cv::Mat()](const datasets::SourceFrame& frame,
+                                        const sensors::DarknessResult& result) mutable {
+      sensors::draw_overlay(frame.image, result, lab::kWhite_mm, picture);
+      sink.take(frame, picture);
+    };
+  }
   ProgressBar bar(global.quiet);
   const std::vector<lab::DarknessRecord> records =
-      lab::write_darkness_maps(model, opened_streams(source), options.out, format, options.doubt, bar.listener());
+      lab::write_darkness_maps(model, opened_streams(source), options.out, format, options.doubt, bar.listener(), show);
+  sink.finish();
   const std::vector<std::string> faults = lab::faults_of(records);
   warn_of_faults(faults);
   warn_of_notes(source);
@@ -60,8 +74,11 @@ void add_9dtact_estimation(CLI::App& estimations, const GlobalOptions& global, A
       "--doubt", options->doubt,
       "Also write FRAME-doubt.png: a pixel adds 1 if saturated, 2 if unlit, 4 if darker and 8 if brighter "
       "than calibrated");
-  command->callback([&action, options, source, &global] {
-    action = [options, source, &global] { estimate(*options, *source, global); };
+  command->add_flag("--overlay", options->overlay,
+                    "Pictures of the frames with the contact's outline, beside their heights (white: 1 mm), too");
+  const auto pictures = add_picture_options(*command);
+  command->callback([&action, options, source, pictures, &global] {
+    action = [options, source, pictures, &global] { estimate(*options, *source, *pictures, global); };
   });
 }
 

@@ -3,7 +3,6 @@
 #include <memory>
 
 #include "apps/command.h"
-#include "apps/estimators/live_options.h"
 #include "apps/estimators/overlay_sink.h"
 #include "apps/estimators/source_options.h"
 #include "apps/progress_bar.h"
@@ -16,7 +15,6 @@
 namespace touchstone::apps {
 namespace {
 
-constexpr double kWhite_mm = 1.0;       // of the heights in overlays
 constexpr std::int64_t kMostRest = 64;  // frames that a background is the mean of
 
 struct EstimateOptions {
@@ -45,7 +43,7 @@ void take_rest(const std::string& place, sensors::HeightModel& model) {
   model.background = sensors::mean_background(frames);
 }
 
-void estimate(const EstimateOptions& options, const SourceOptions& source, const LiveOptions& live,
+void estimate(const EstimateOptions& options, const SourceOptions& source, const PictureOptions& pictures,
               const GlobalOptions& global) {
   sensors::HeightModel model = sensors::load_height_model(options.model);
   if (!options.rest.empty()) take_rest(options.rest, model);
@@ -53,20 +51,20 @@ void estimate(const EstimateOptions& options, const SourceOptions& source, const
   settings.follow.frames = options.follow;
   if (options.border == "free") settings.border = sensors::HeightBorder::free;
   const lab::HeightFormat format = options.format == "exr" ? lab::HeightFormat::exr : lab::HeightFormat::png16;
-  const std::unique_ptr<LiveView> view = opened_view(live, "heights of " + source.choice.place);
-  const OverlaySink sink(options.overlay ? options.out / "overlay" : "", view.get());
+  OverlaySink sink(pictures, options.overlay ? options.out / "overlay" : "", "heights of " + source.choice.place);
   std::function<void(const datasets::SourceFrame&, const sensors::HeightResult&)> show;
   if (sink.wanted()) {
     show = [&sink, picture = cv::Mat()](const datasets::SourceFrame& frame,
                                         const sensors::HeightResult& result) mutable {
-      sensors::draw_overlay(frame.image, result, kWhite_mm, picture);
-      sink.take(frame.stem, picture);
+      sensors::draw_overlay(frame.image, result, lab::kWhite_mm, picture);
+      sink.take(frame, picture);
     };
   }
   ProgressBar bar(global.quiet);
   const std::vector<lab::HeightRecord> records =
       lab::write_height_maps(model, settings, opened_streams(source), options.out, format, bar.listener(), show);
   const std::vector<std::string> faults = lab::faults_of(records);
+  sink.finish();
   warn_of_faults(faults);
   warn_of_notes(source);
   const auto count = [&](auto fault) { return std::count_if(records.begin(), records.end(), fault); };
@@ -114,9 +112,9 @@ void add_gelsight_estimation(CLI::App& estimations, const GlobalOptions& global,
       ->capture_default_str();
   command->add_flag("--overlay", options->overlay,
                     "Pictures of the frames with the contact's outline, beside their heights (white: 1 mm), too");
-  const auto live = add_live_options(*command);
-  command->callback([&action, options, source, live, &global] {
-    action = [options, source, live, &global] { estimate(*options, *source, *live, global); };
+  const auto pictures = add_picture_options(*command);
+  command->callback([&action, options, source, pictures, &global] {
+    action = [options, source, pictures, &global] { estimate(*options, *source, *pictures, global); };
   });
 }
 

@@ -6,8 +6,8 @@
 #include <optional>
 
 #include "apps/command.h"
-#include "apps/estimators/live_options.h"
 #include "apps/estimators/marker_options.h"
+#include "apps/estimators/overlay_sink.h"
 #include "apps/progress_bar.h"
 #include "core/error.h"
 #include "lab/gelsight/marker_tracks.h"
@@ -19,6 +19,7 @@ namespace {
 struct EstimateOptions {
   lab::MarkerTrackSettings settings;
   bool touch = false;
+  bool overlay = false;
   std::filesystem::path force;
   std::string indenter;
   std::filesystem::path out;
@@ -58,22 +59,46 @@ void print_errors(const std::vector<lab::MarkerTrack>& tracks) {
   }
 }
 
-void estimate(const EstimateOptions& options, const MarkerOptions& chosen, const LiveOptions& live,
+void warn_of_rest(const lab::MarkerTrack& track) {
+  if (track.rest_frame >= 0) {
+    spdlog::warn(
+        "{}: the first frame is touched: frame {}, whose rows are straightest, is taken for the gel at rest; "
+        "--rest FILE names another",
+        track.sequence, track.rest_frame);
+  } else if (track.touched_at_rest_seen >= 0) {
+    spdlog::warn(
+        "{}: frame {} shows that the gel was touched in the frame at rest: displacements are from there; "
+        "--rest FILE names another",
+        track.sequence, track.touched_at_rest_seen);
+  }
+}
+
+void estimate(const EstimateOptions& options, const MarkerOptions& chosen, const PictureOptions& pictures,
               const GlobalOptions& global) {
   lab::MarkerTrackSettings settings = options.settings;
   settings.rest = chosen.rest;
   settings.touch = wanted_touches(options, chosen);
-  const std::unique_ptr<LiveView> view = opened_view(live, "markers of " + chosen.source->choice.place);
-  settings.show = shown_in(view.get());
+  if (settings.touch && settings.touch->normal) {
+    const sensors::LinearForce& line = *settings.touch->normal;
+    settings.full_force_N = std::max(0.1, line.force_N(line.highest_seen));
+  }
+  OverlaySink sink(pictures, options.overlay ? options.out / "overlay" : "",
+                   "markers of " + chosen.source->choice.place);
+  if (sink.wanted()) {
+    settings.show = [&sink](const datasets::SourceFrame& frame, const cv::Mat& picture) { sink.take(frame, picture); };
+    settings.begin_again = [&sink] { sink.begin_again(); };
+  }
   std::vector<lab::MarkerTrack> tracks;
   {
     ProgressBar bar(global.quiet);
     tracks = lab::write_marker_tracks(opened_streams(*chosen.source), settings, options.out, bar.listener());
   }
+  sink.finish();
   warn_of_notes(*chosen.source);
   std::int64_t frames = 0;
   for (const lab::MarkerTrack& track : tracks) {
     warn_of_faults(track.faults);
+    warn_of_rest(track);
     if (track.jumped_at >= 0) {
       spdlog::warn(
           "{}: frame {}: markers went farther than can be followed; until the gel is at rest again none is trusted",
@@ -109,17 +134,18 @@ void add_markers_estimation(CLI::App& estimations, const GlobalOptions& global, 
   command->add_option("--force", options->force,
                       "The force model that `touchstone calibrate markers` made: forces with their errors, too");
   command->add_option("--indenter", options->indenter, "Whose line of normal force; needed if the model has several");
-  command->add_flag("--overlay", options->settings.overlay, "Pictures of the frames with arrows, too");
+  command->add_flag("--overlay", options->overlay,
+                    "Pictures of the frames with arrows, and with what else is read: contact, slip, force");
   command
       ->add_option("--arrow-scale", options->settings.arrow_scale,
                    "Length of these arrows for a displacement of 1 px, px")
       ->check(CLI::Range(0.1, 1000.0))
       ->capture_default_str();
-  const auto live = add_live_options(*command);
+  const auto pictures = add_picture_options(*command);
   command->add_option("-o,--out", options->out, "The folder of markers.csv, touch.csv and of the folder 'overlay'")
       ->required();
-  command->callback([&action, options, frames, live, &global] {
-    action = [options, frames, live, &global] { estimate(*options, *frames, *live, global); };
+  command->callback([&action, options, frames, pictures, &global] {
+    action = [options, frames, pictures, &global] { estimate(*options, *frames, *pictures, global); };
   });
 }
 

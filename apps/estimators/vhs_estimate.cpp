@@ -1,7 +1,6 @@
 #include <memory>
 
 #include "apps/command.h"
-#include "apps/estimators/live_options.h"
 #include "apps/estimators/overlay_sink.h"
 #include "apps/estimators/tracker_options.h"
 #include "core/error.h"
@@ -86,18 +85,18 @@ void write_distribution(const EstimateOptions& options, const std::vector<lab::T
 /// What draws each frame's beads with the force that they give; of the model's rest positions, or those of the first
 /// frame that is drawn.
 std::function<void(const datasets::SourceFrame&, const sensors::TrackedBeads&)> drawn_forces(
-    const OverlaySink& sink, const sensors::StiffnessForceModel& model, bool first_is_rest) {
+    OverlaySink& sink, const sensors::StiffnessForceModel& model, bool first_is_rest) {
   if (!sink.wanted()) return {};
   std::vector<Eigen::Vector2d> rest = first_is_rest ? std::vector<Eigen::Vector2d>() : model.rest;
   return [&sink, &model, rest, picture = cv::Mat()](const datasets::SourceFrame& frame,
                                                     const sensors::TrackedBeads& beads) mutable {
     if (rest.empty()) rest = beads.positions;
     sensors::draw_overlay(frame.image, beads, sensors::estimate(model, beads, rest), picture);
-    sink.take(frame.stem, picture);
+    sink.take(frame, picture);
   };
 }
 
-void estimate(const EstimateOptions& options, const FrameOptions& frames, const LiveOptions& live,
+void estimate(const EstimateOptions& options, const FrameOptions& frames, const PictureOptions& pictures,
               const GlobalOptions& global) {
   if (options.compliance.empty() != options.distribution.empty()) {
     fail("--compliance and --distribution belong together: the gel's compliance, and the folder for the result");
@@ -107,10 +106,10 @@ void estimate(const EstimateOptions& options, const FrameOptions& frames, const 
   FrameOptions with_grid = frames;
   with_grid.tracker.grid = model.grid;
   const bool first_is_rest = options.rest == "first";
-  const std::unique_ptr<LiveView> view = opened_view(live, "forces of " + frames.source->choice.place);
-  const OverlaySink sink(options.overlay, view.get());
+  OverlaySink sink(pictures, options.overlay, "forces of " + frames.source->choice.place);
   const std::vector<lab::TrackedSequence> tracked =
       tracked_frames(with_grid, global, drawn_forces(sink, model, first_is_rest));
+  sink.finish();
   if (!options.compliance.empty()) write_distribution(options, tracked, model);
   const lab::RestChoice rest = first_is_rest ? lab::RestChoice::first_frame : lab::RestChoice::model;
   const std::vector<lab::ForceRecord> records = lab::estimate_forces(tracked, model, rest);
@@ -160,9 +159,9 @@ void add_vhs_estimation(CLI::App& estimations, const GlobalOptions& global, Acti
       ->check(CLI::Range(1e-5, 1.0))
       ->capture_default_str();
   command->add_option("--overlay", options->overlay, "A folder for pictures of the frames with beads and force");
-  const auto live = add_live_options(*command);
-  command->callback([&action, &global, options, frames, live] {
-    action = [options, frames, live, &global] { estimate(*options, *frames, *live, global); };
+  const auto pictures = add_picture_options(*command);
+  command->callback([&action, &global, options, frames, pictures] {
+    action = [options, frames, pictures, &global] { estimate(*options, *frames, *pictures, global); };
   });
 }
 

@@ -15,9 +15,8 @@
 #include <utility>
 
 #include "core/input_file.h"
-#include "core/own_module.h"
 #include "core/units.h"
-#include "datasets/sources/video_module.h"
+#include "datasets/sources/opened_video_module.h"
 
 namespace touchstone::datasets {
 namespace {
@@ -27,16 +26,6 @@ namespace fs = std::filesystem;
 constexpr std::array<const char*, 3> kSchemes = {"http://", "https://", "rtsp://"};
 constexpr std::size_t kMostWaiting = 8;  // frames of a live source that an estimator is behind
 constexpr auto kLook = std::chrono::milliseconds(50);
-
-const TouchstoneVideoModule& video_module() {
-  static const TouchstoneVideoModule& module =
-      own_module_table<TouchstoneVideoModule>({.name = TOUCHSTONE_VIDEO_MODULE_NAME,
-                                               .built = TOUCHSTONE_VIDEO_MODULE_BUILT,
-                                               .purpose = "videos and cameras",
-                                               .symbol = kTouchstoneVideoModuleSymbol},
-                                              kTouchstoneVideoModuleVersion);
-  return module;
-}
 
 /// An opened video, camera or address.
 class OpenVideo {

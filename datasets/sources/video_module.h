@@ -38,9 +38,20 @@ struct TouchstoneVideoModule {
   /// 1: a frame, or a fault of one; 0: the end; -1: it can't go on, and `message` says why.
   int (*read)(void* video, TouchstoneVideoFrame* frame, char* message, std::size_t message_size);
   void (*close)(void* video);
+
+  /// A new video of H.264 in MP4, whatever the file's name. Null if it can't be written: `message` says why.
+  void* (*create)(const char* file, int width, int height, char* message, std::size_t message_size);
+  /// Adds a picture, BGR of that size, that is shown from `t_us` on; of an odd size the last row or column is left out.
+  /// Not 0: it can't be, and `message` says why.
+  int (*add)(void* video, const unsigned char* pixels, std::size_t row_bytes, long long t_us, char* message,
+             std::size_t message_size);
+  /// Brings all to the file. Not 0: it can't, and `message` says why.
+  int (*finish)(void* video, char* message, std::size_t message_size);
+  /// Ends what create() began, finished or not.
+  void (*drop)(void* video);
 };
 
-constexpr int kTouchstoneVideoModuleVersion = 1;  ///< changes with any of these structs
+constexpr int kTouchstoneVideoModuleVersion = 2;  ///< changes with any of these structs
 constexpr const char* kTouchstoneVideoModuleSymbol =
     "touchstone_video_module_table";  ///< the module's function that returns its table
 }

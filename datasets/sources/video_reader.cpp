@@ -3,6 +3,8 @@
 
 #include "datasets/sources/video_reader.h"
 
+#include "datasets/sources/ffmpeg_words.h"
+
 extern "C" {
 #include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
@@ -14,7 +16,6 @@ extern "C" {
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdarg>
 #include <cstdio>
 #include <utility>
 #include <vector>
@@ -31,42 +32,11 @@ constexpr const char* kNetworkOnly = "http,https,tcp,tls,udp,rtp,rtsp,srtp,crypt
 constexpr std::int64_t kMostPixels = 100'000'000;
 constexpr AVRational kMicroseconds = {1, 1'000'000};
 
-// What FFmpeg says of what goes wrong while this thread calls it.
-thread_local bool listening = false;
-thread_local std::string last_words;
-
-void note_log(void* context, int level, const char* format, std::va_list args) {
-  if (!listening) return av_log_default_callback(context, level, format, args);
-  if (level > AV_LOG_ERROR) return;
-  char line[512];
-  std::vsnprintf(line, sizeof line, format, args);
-  last_words = line;
-  while (!last_words.empty() && (last_words.back() == '\n' || last_words.back() == ' ')) last_words.pop_back();
-}
-
-/// While it lives, this thread's calls print nothing, and what they'd print is kept.
-class Listener {
- public:
-  Listener() {
-    listening = true;
-    last_words.clear();
-  }
-  ~Listener() { listening = false; }
-  Listener(const Listener&) = delete;
-  Listener& operator=(const Listener&) = delete;
-};
-
-std::string words_of(int error) {
-  char text[AV_ERROR_MAX_STRING_SIZE] = {};
-  av_strerror(error, text, sizeof text);
-  return last_words.empty() ? std::string(text) : last_words;
-}
-
 class Video : public VideoInput {
  public:
   Video(bool address, const VideoPatience& patience) : address_(address), patience_(patience) {}
   ~Video() override {
-    const Listener listener;
+    const FfmpegListener listener;
     sws_freeContext(scaler_);
     av_frame_free(&picture_);
     av_packet_free(&packet_);
@@ -134,7 +104,7 @@ bool Video::open_decoder(std::string& message) {
   decoder_->err_recognition = AV_EF_CRCCHECK | AV_EF_BITSTREAM | AV_EF_BUFFER | AV_EF_EXPLODE;
   decoder_->max_pixels = kMostPixels;
   if (const int error = avcodec_open2(decoder_, codec, nullptr); error < 0) {
-    message = words_of(error);
+    message = ffmpeg_words(error);
     return false;
   }
   const AVCodecDescriptor* const known = avcodec_descriptor_get(decoder_->codec_id);
@@ -150,7 +120,7 @@ bool Video::open_decoder(std::string& message) {
 }
 
 bool Video::open(const std::string& place, TouchstoneVideoInfo& info, std::string& message) {
-  const Listener listener;
+  const FfmpegListener listener;
   format_ = avformat_alloc_context();
   format_->interrupt_callback = {&Video::gives_up, this};
   wait_anew();
@@ -166,7 +136,7 @@ bool Video::open(const std::string& place, TouchstoneVideoInfo& info, std::strin
   if (error >= 0 && !known) error = avformat_find_stream_info(format_, nullptr);
   if (error < 0) {
     const bool waited = address_ && !patience_.ended() && Clock::now() > deadline_;
-    message = waited ? nothing_came() : words_of(error);
+    message = waited ? nothing_came() : ffmpeg_words(error);
     return false;
   }
   if (!open_decoder(message)) return false;
@@ -189,10 +159,10 @@ bool Video::feed(std::string& message) {
       if (address_) {
         message = Clock::now() > deadline_                        ? nothing_came()
                   : error == AVERROR_EOF || error == AVERROR(EIO) ? "the stream ended"
-                                                                  : words_of(error);
+                                                                  : ffmpeg_words(error);
         return false;
       }
-      cut_ = error != AVERROR_EOF || !last_words.empty();
+      cut_ = error != AVERROR_EOF || !ffmpeg_said().empty();
       drained_ = true;
       avcodec_send_packet(decoder_, nullptr);
       return true;
@@ -204,22 +174,22 @@ bool Video::feed(std::string& message) {
     if (packet_time_ != AV_NOPTS_VALUE) last_end_ = std::max(last_end_, packet_time_ + packet_->duration);
     if ((packet_->flags & AV_PKT_FLAG_CORRUPT) != 0) send_fault_ = "is cut off";
     const int sent = avcodec_send_packet(decoder_, packet_);
-    if (sent < 0) send_fault_ = "is damaged (" + words_of(sent) + ")";
+    if (sent < 0) send_fault_ = "is damaged (" + ffmpeg_words(sent) + ")";
     return true;
   }
 }
 
 int Video::read(TouchstoneVideoFrame& frame, std::string& message) {
   if (ended_) return 0;
-  const Listener listener;
+  const FfmpegListener listener;
   for (;;) {
     const int got = avcodec_receive_frame(decoder_, picture_);
     if (got == 0) {
-      if (send_fault_.empty() && !last_words.empty()) send_fault_ = "is damaged (" + last_words + ")";
+      if (send_fault_.empty() && !ffmpeg_said().empty()) send_fault_ = "is damaged (" + ffmpeg_said() + ")";
       return give(frame);
     }
     if (got == AVERROR_EOF) return end(frame, message);
-    if (got != AVERROR(EAGAIN) && send_fault_.empty()) send_fault_ = "is damaged (" + words_of(got) + ")";
+    if (got != AVERROR(EAGAIN) && send_fault_.empty()) send_fault_ = "is damaged (" + ffmpeg_words(got) + ")";
     if (!send_fault_.empty() && !drained_) {
       spoilt_ = !intra_only_;
       set_time(packet_time_, frame);
@@ -332,12 +302,11 @@ bool Video::convert() {
 
 std::unique_ptr<VideoInput> open_video(const std::string& place, bool address, const VideoPatience& patience,
                                        TouchstoneVideoInfo& info, std::string& message) {
-  static const bool heard = [] {
-    av_log_set_callback(&note_log);
+  static const bool begun = [] {
     avformat_network_init();
     return true;
   }();
-  static_cast<void>(heard);
+  static_cast<void>(begun);
   auto video = std::make_unique<Video>(address, patience);
   if (!video->open(place, info, message)) return nullptr;
   return video;

@@ -78,17 +78,22 @@ class ForceTable {
 
   /// Adds a line. Its cells are empty if too few markers are measured for a force.
   /// @return how the markers moved under the tractions; of none where there are no tractions
-  sensors::MarkerField add(const std::string& file, const sensors::HueField& field, std::string& csv) {
+  /// @param shown given the force and slip
+  sensors::MarkerField add(const std::string& file, const sensors::HueField& field, std::string& csv,
+                           ShownField& shown) {
     const sensors::MarkerField markers = sensors::as_seen(trusted(field), inversion_.compliance(), parallax_);
     const auto used = std::count(markers.measured.begin(), markers.measured.end(), 1);
     csv += fmt::format("{},{}", file, used);
     if (used < sensors::TractionInversion::kLeastMarkers) {
       observer_.restart();
-      csv += fmt::format("{},too few markers,,,,\n", std::string(13, ','));
+      shown.slip = "too few markers";
+      csv += fmt::format("{},{},,,,\n", std::string(13, ','), shown.slip);
       return {};
     }
     const sensors::TractionField tractions = inversion_.invert(markers);
     const sensors::FrictionState& friction = observer_.update(markers, tractions);
+    shown.force_N = tractions.wrench.head<3>();
+    shown.slip = sensors::name_of(friction.state);
     for (int i = 0; i < 6; ++i) csv += fmt::format(",{:.5f}", tractions.wrench[i]);
     for (int i = 0; i < 6; ++i) csv += fmt::format(",{:.5f}", tractions.sigma(i));
     csv += fmt::format(",{:.3f},{}", tractions.misfit, sensors::name_of(friction.state));
@@ -130,7 +135,7 @@ void find_rest_of(sensors::ColourMarkerFinder& finder, const fs::path& picture) 
 FieldSummary write_chroma_fields(const sensors::HueModel& model, const Eigen::Vector2i& grid, const fs::path& rest,
                                  const std::vector<datasets::FrameStream>& streams,
                                  const std::optional<FieldForces>& forces, const fs::path& folder,
-                                 const Progress& progress) {
+                                 const Progress& progress, const ShowField& show) {
   sensors::ColourMarkerFinder finder({.grid = grid});
   find_rest_of(finder, rest);
   const sensors::HueEstimator estimator(model, finder.rest());
@@ -154,7 +159,9 @@ FieldSummary write_chroma_fields(const sensors::HueModel& model, const Eigen::Ve
       const sensors::ColourMarkerReading& reading = finder.find(image);
       const sensors::HueField field = estimator.estimate(reading);
       sensors::MarkerField elastic;
-      if (table) elastic = table->add(name, field, force_line);
+      ShownField shown{finder.rest(), reading, field};
+      if (table) elastic = table->add(name, field, force_line, shown);
+      if (show) show(frame, shown);
       add_displacements(name, reading, field, table ? &elastic : nullptr, lines);
       if (table && elastic.displacement.empty()) ++summary.without_force;
       summary.markers += static_cast<int>(reading.markers.size());

@@ -2,6 +2,7 @@
 // Fields and forces of a chroma sensor on disk, from frames of any source.
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -31,6 +32,18 @@ struct FieldSummary {
   std::vector<std::string> faults;  ///< of frames that can't be read or are unfit: they have no markers
 };
 
+/// What is known of one frame.
+struct ShownField {
+  const sensors::ColourMarkerReading& rest;
+  const sensors::ColourMarkerReading& seen;
+  const sensors::HueField& field;
+  std::optional<Eigen::Vector3d> force_N = {};  ///< on the object; none without forces, or with too few markers
+  std::string slip = {};                        ///< as in the table
+};
+
+/// Shown each frame with what is known of it; may be empty.
+using ShowField = std::function<void(const datasets::SourceFrame& frame, const ShownField& field)>;
+
 /// Estimates each frame, in their order, and writes FOLDER/displacements.csv and, if `forces` are given,
 /// FOLDER/forces.csv (docs/file-formats.md, "Recorded frames"), as frames come: they are there when all are done. The
 /// folder is made if it isn't there. A frame that can't be read or is unfit (see ColourMarkerFinder) has one line,
@@ -41,7 +54,7 @@ struct FieldSummary {
 FieldSummary write_chroma_fields(const sensors::HueModel& model, const Eigen::Vector2i& grid,
                                  const std::filesystem::path& rest, const std::vector<datasets::FrameStream>& streams,
                                  const std::optional<FieldForces>& forces, const std::filesystem::path& folder,
-                                 const Progress& progress = {});
+                                 const Progress& progress = {}, const ShowField& show = {});
 
 /// The picture at rest, read and found. @throws Error naming it
 void find_rest_of(sensors::ColourMarkerFinder& finder, const std::filesystem::path& picture);

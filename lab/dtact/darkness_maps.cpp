@@ -50,7 +50,7 @@ DarknessRecord record_of(const sensors::DarknessResult& result, double pixel_mm2
 std::vector<DarknessRecord> write_darkness_maps(const sensors::DarknessModel& model,
                                                 const std::vector<datasets::FrameStream>& streams,
                                                 const fs::path& folder, HeightFormat format, bool doubt,
-                                                const Progress& progress) {
+                                                const Progress& progress, const ShownDarkness& show) {
   sensors::DarknessEstimator estimator(model);
   fs::create_directories(folder);
   const double pixel_mm2 = model.mm_per_px * model.mm_per_px;
@@ -62,6 +62,7 @@ std::vector<DarknessRecord> write_darkness_maps(const sensors::DarknessModel& mo
     const std::string fault = datasets::fault_on_frame(frame, [&](const cv::Mat& image) {
       result = &estimator.estimate(image);
       record = record_of(*result, pixel_mm2);
+      if (show) show(frame, *result);
     });
     record.file = datasets::name_in_table(frame);
     if (fault.empty()) {

@@ -2,6 +2,7 @@
 // Height maps on disk, from frames, of any source, of a gel that shows depth as darkness.
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,9 @@ struct DarknessRecord {
   std::string fault = {};  ///< as HeightRecord's
 };
 
+/// Shown each frame with its result; may be empty.
+using ShownDarkness = std::function<void(const datasets::SourceFrame& frame, const sensors::DarknessResult& result)>;
+
 /// Estimates each frame of each stream and writes FOLDER/STEM.exr or .png (of several streams FOLDER/SEQUENCE/STEM);
 /// with `doubt` also STEM-doubt.png (bits of sensors::Doubt); and FOLDER/heights.csv when all are done. Folders are
 /// made if they aren't there. A frame that can't be read or estimated has a record with its fault, and no map.
@@ -34,6 +38,6 @@ struct DarknessRecord {
 std::vector<DarknessRecord> write_darkness_maps(const sensors::DarknessModel& model,
                                                 const std::vector<datasets::FrameStream>& streams,
                                                 const std::filesystem::path& folder, HeightFormat format, bool doubt,
-                                                const Progress& progress = {});
+                                                const Progress& progress = {}, const ShownDarkness& show = {});
 
 }  // namespace touchstone::lab

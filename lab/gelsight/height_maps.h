@@ -13,6 +13,9 @@
 
 namespace touchstone::lab {
 
+/// The height that is white in pictures of heights.
+inline constexpr double kWhite_mm = 1.0;
+
 /// How a height map is stored.
 enum class HeightFormat {
   exr,   ///< one float channel, `height_mm`

@@ -12,6 +12,7 @@
 #include "core/whole_file_writer.h"
 #include "datasets/sets/csv_cells.h"
 #include "sensors/markers/marker_overlay.h"
+#include "sensors/markers/touch_overlay.h"
 #include "sim/files/image_file.h"
 
 namespace touchstone::lab {
@@ -103,18 +104,37 @@ struct Opened {
   std::string refused = {};                    ///< why there's no follower
 };
 
+/// A frame of a recording by its number. @throws Error if it can't be read
+cv::Mat frame_numbered(const datasets::FrameStream& stream, int number) {
+  const std::unique_ptr<datasets::FrameSource> source = stream.open();
+  for (datasets::SourceFrame frame; source->next(frame);) {
+    if (frame.label.frame != number) continue;
+    if (!frame.fault.empty()) fail("{}", frame.fault);
+    return frame.image;
+  }
+  fail("{}: has no frame {}", stream.name, number);
+}
+
+/// Is a sequence's first frame its gel at rest?
+bool rests_at_first(const datasets::FrameStream& stream, const MarkerTrackSettings& settings) {
+  return settings.rest.empty() && !stream.rest;
+}
+
 /// Opens a sequence and shows its gel at rest to a follower, as far as that can be done.
-Opened opened(const datasets::FrameStream& stream, const MarkerTrackSettings& settings) {
+/// @param rest_frame the frame that shows it; -1: as the settings and the stream say
+Opened opened(const datasets::FrameStream& stream, const MarkerTrackSettings& settings, int rest_frame) {
   Opened one;
   one.source = stream.open();
-  if (settings.rest.empty() && !stream.rest) {
+  if (rests_at_first(stream, settings) && rest_frame < 0) {
     one.first.emplace();
     if (!one.source->next(*one.first)) fail("{}: has no frame", stream.name);
   }
   std::string name = settings.rest.string();
   try {
     cv::Mat rest;
-    if (!settings.rest.empty()) {
+    if (rest_frame >= 0) {
+      rest = frame_numbered(stream, rest_frame);
+    } else if (!settings.rest.empty()) {
       rest = sim::read_image(settings.rest);
     } else if (stream.rest) {
       name = stream.name + ": its background";
@@ -134,9 +154,26 @@ Opened opened(const datasets::FrameStream& stream, const MarkerTrackSettings& se
   return one;
 }
 
+/// Notes what a frame says of the frame at rest.
+class RestSearch {
+ public:
+  void see(int frame, const sensors::TrackedMarkers& markers, MarkerTrack& track) {
+    if (!markers.rest_was_touched) return;
+    if (track.touched_at_rest_seen < 0) track.touched_at_rest_seen = frame;
+    const sensors::RestDoubt& doubt = markers.rest_doubt;
+    const bool whole = markers.found() == static_cast<int>(markers.rest.size()) && !markers.jumped;
+    if (!whole || !doubt.rest_was_touched() || doubt.bend_px >= least_px_) return;
+    least_px_ = doubt.bend_px;
+    track.better_rest = frame;
+  }
+
+ private:
+  double least_px_ = std::numeric_limits<double>::infinity();
+};
+
 /// @param one whose follower has seen the gel at rest
 MarkerTrack follow(const datasets::FrameStream& stream, Opened& one, const MarkerTrackSettings& settings,
-                   const fs::path& overlays, Tables& tables, const std::function<void()>& frame_done) {
+                   Tables& tables, const std::function<void()>& frame_done) {
   MarkerTrack track;
   track.sequence = stream.name;
   Follower& follower = *one.follower;
@@ -144,6 +181,7 @@ MarkerTrack follow(const datasets::FrameStream& stream, Opened& one, const Marke
   track.appearance.spacing_px = follower.tracker().spacing_px();  // between centres, where learning is good to pixels
   track.markers = static_cast<int>(follower.markers().rest.size());
   cv::Mat picture;
+  RestSearch search;
   const auto read = [&](const datasets::SourceFrame& frame) {
     const datasets::LabelledFrame& label = frame.label;
     const std::string start = line_start(stream.name, label);
@@ -160,8 +198,10 @@ MarkerTrack follow(const datasets::FrameStream& stream, Opened& one, const Marke
       track.places += static_cast<std::int64_t>(markers.rest.size());
       for (std::size_t i = 0; i < markers.rest.size(); ++i) track.trusted += markers.trusted(i) ? 1 : 0;
       if (markers.jumped && track.jumped_at < 0) track.jumped_at = label.frame;
-      if (settings.overlay || settings.show) {
+      search.see(label.frame, markers, track);
+      if (settings.show) {
         sensors::draw_overlay(image, markers, track.appearance, picture, {.arrow_scale = settings.arrow_scale});
+        if (touch != nullptr) sensors::draw_touch(*touch, picture, {.full_force_N = settings.full_force_N});
       }
     });
     if (!fault.empty()) {
@@ -169,8 +209,7 @@ MarkerTrack follow(const datasets::FrameStream& stream, Opened& one, const Marke
       track.faults.push_back(std::move(fault));
     } else {
       tables.add(lines, touch_text);
-      if (settings.overlay) sim::write_png(overlays / (frame.stem + ".png"), picture);
-      if (settings.show) settings.show(picture);
+      if (settings.show) settings.show(frame, picture);
     }
     frame_done();
   };
@@ -179,57 +218,83 @@ MarkerTrack follow(const datasets::FrameStream& stream, Opened& one, const Marke
   return track;
 }
 
-}  // namespace
-
-std::vector<MarkerTrack> write_marker_tracks(const std::vector<datasets::FrameStream>& streams,
-                                             const MarkerTrackSettings& settings, const fs::path& folder,
-                                             const Progress& progress) {
-  const std::int64_t total = datasets::frames_of(streams);
-  std::int64_t done = 0;
-  const auto frame_done = [&] {
-    ++done;
-    if (progress) progress("markers", done, total);
-  };
+/// All frames once. @param rests of each stream the frame that shows its gel at rest; -1: as `opened` says
+/// @param frame_done called for each frame @param tables are finished by who calls
+std::vector<MarkerTrack> follow_all(const std::vector<datasets::FrameStream>& streams,
+                                    const MarkerTrackSettings& settings, const std::vector<int>& rests,
+                                    const fs::path& folder, std::optional<Tables>& tables,
+                                    const std::function<void(std::int64_t frames)>& frames_done) {
   // All frames at rest come before anything is written. What is made of them isn't kept: of many sequences it's large.
   std::vector<std::string> refused;
   Opened only;
-  for (const datasets::FrameStream& stream : streams) {
-    Opened one = opened(stream, settings);
+  for (std::size_t i = 0; i < streams.size(); ++i) {
+    Opened one = opened(streams[i], settings, rests[i]);
     if (!one.refused.empty() && (streams.size() == 1 || !settings.rest.empty())) fail("{}", one.refused);
     refused.push_back(one.refused);
     if (streams.size() == 1) only = std::move(one);
   }
   fs::create_directories(folder);
+  tables.emplace(folder, settings.touch.has_value());
   std::vector<MarkerTrack> tracks;
-  std::vector<std::string> faults;
-  Tables tables(folder, settings.touch.has_value());
   for (std::size_t i = 0; i < streams.size(); ++i) {
     const datasets::FrameStream& stream = streams[i];
-    const fs::path overlays = folder / "overlay";
     if (refused[i].empty()) {
-      if (settings.overlay) fs::create_directories(streams.size() > 1 ? overlays / stream.name : overlays);
-      Opened again = streams.size() == 1 ? std::move(only) : opened(stream, settings);
-      tracks.push_back(follow(stream, again, settings, overlays, tables, frame_done));
+      Opened again = streams.size() == 1 ? std::move(only) : opened(stream, settings, rests[i]);
+      tracks.push_back(follow(stream, again, settings, *tables, [&] { frames_done(1); }));
+      tracks.back().rest_frame = rests[i];
     } else {
       datasets::SourceFrame first;
       stream.open()->next(first);
-      tables.add_fault(line_start(stream.name, first.label), refused[i]);
+      tables->add_fault(line_start(stream.name, first.label), refused[i]);
       MarkerTrack none;
       none.sequence = stream.name;
       none.faults.push_back(refused[i]);
       tracks.push_back(std::move(none));
-      done += stream.frames.value_or(0);
+      frames_done(stream.frames.value_or(0));
     }
-    const MarkerTrack& track = tracks.back();
-    if (track.frames == 0) faults.insert(faults.end(), track.faults.begin(), track.faults.end());
   }
-  std::size_t without_frames = 0;
-  for (const MarkerTrack& track : tracks) without_frames += track.frames == 0 ? 1U : 0U;
-  if (without_frames == tracks.size()) {
-    fail("none of {} frames can be used{}{}", done,
-         faults.empty() ? "" : "; the first: ", faults.empty() ? "" : faults.front());
+  return tracks;
+}
+
+/// @throws Error if no frame could be used
+void require_frames(const std::vector<MarkerTrack>& tracks, std::int64_t done) {
+  std::vector<std::string> faults;
+  for (const MarkerTrack& track : tracks) {
+    if (track.frames > 0) return;
+    faults.insert(faults.end(), track.faults.begin(), track.faults.end());
   }
-  tables.finish();
+  fail("none of {} frames can be used{}{}", done,
+       faults.empty() ? "" : "; the first: ", faults.empty() ? "" : faults.front());
+}
+
+}  // namespace
+
+std::vector<MarkerTrack> write_marker_tracks(const std::vector<datasets::FrameStream>& streams,
+                                             const MarkerTrackSettings& settings, const fs::path& folder,
+                                             const Progress& progress) {
+  std::int64_t total = datasets::frames_of(streams);
+  std::int64_t done = 0;
+  const auto frames_done = [&](std::int64_t frames) {
+    done += frames;
+    if (progress) progress("markers", done, total);
+  };
+  std::optional<Tables> tables;
+  std::vector<int> rests(streams.size(), -1);
+  std::vector<MarkerTrack> tracks = follow_all(streams, settings, rests, folder, tables, frames_done);
+  require_frames(tracks, done);
+  bool again = false;
+  for (std::size_t i = 0; i < streams.size(); ++i) {
+    if (streams[i].live || !rests_at_first(streams[i], settings)) continue;
+    rests[i] = tracks[i].better_rest;
+    again |= rests[i] >= 0;
+  }
+  if (again) {
+    tables.reset();  // unfinished: there are no such files
+    if (settings.begin_again) settings.begin_again();
+    total *= 2;
+    tracks = follow_all(streams, settings, rests, folder, tables, frames_done);
+  }
+  tables->finish();
   return tracks;
 }
 

@@ -3,6 +3,7 @@
 
 #include <opencv2/core/mat.hpp>
 
+#include "sensors/heights/darkness_estimator.h"
 #include "sensors/heights/height_estimator.h"
 
 namespace touchstone::sensors {
@@ -13,5 +14,8 @@ namespace touchstone::sensors {
 /// @throws Error unless the frame is 8 bit of 3 channels and of the result's size, or for a `highest_mm` that isn't
 /// above 0
 void draw_overlay(const cv::Mat& frame, const HeightResult& result, double highest_mm, cv::Mat& picture);
+
+/// The same of a gel that shows depth as darkness, whose frame may be grey.
+void draw_overlay(const cv::Mat& frame, const DarknessResult& result, double highest_mm, cv::Mat& picture);
 
 }  // namespace touchstone::sensors

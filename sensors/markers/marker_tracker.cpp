@@ -182,6 +182,8 @@ void MarkerTracker::begin(const std::vector<MarkerBlob>& blobs) {
   before_ = result_.rest;
   step_.assign(result_.rest.size(), Eigen::Vector2d::Zero());
   nearest_blob_.assign(result_.rest.size(), -1);
+  found_.assign(result_.rest.size(), 1);
+  triples_ = opposite_neighbours(result_.rest, spacing_px_);
   strays_.clear();
   strays_.reserve(result_.rest.size());
 }
@@ -254,6 +256,13 @@ void MarkerTracker::follow(const std::vector<MarkerBlob>& blobs, std::int64_t t_
     if (!is_found(result_.status[i])) result_.positions[i] = carried_by_neighbours(i);
   }
   note_steps(t_us);
+  doubt_rest();
+}
+
+void MarkerTracker::doubt_rest() {
+  for (std::size_t i = 0; i < found_.size(); ++i) found_[i] = is_found(result_.status[i]) ? 1 : 0;
+  result_.rest_doubt = rest_doubt(triples_, result_.rest, result_.positions, found_);
+  result_.rest_was_touched |= !result_.jumped && result_.rest_doubt.rest_was_touched();
 }
 
 void MarkerTracker::match(const std::vector<MarkerBlob>& blobs) {

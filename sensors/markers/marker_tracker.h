@@ -26,6 +26,7 @@
 #include "core/frame.h"
 #include "sensors/markers/marker_finder.h"
 #include "sensors/markers/marker_learning.h"
+#include "sensors/markers/rest_doubt.h"
 
 namespace touchstone::sensors {
 
@@ -65,6 +66,8 @@ struct TrackedMarkers {
   int unclaimed = 0;         ///< blobs that look like a whole marker and belong to none
   bool jumped = false;       ///< markers may have taken their neighbours' names (see above)
   FrameLight light = FrameLight::kNormal;
+  RestDoubt rest_doubt = {};      ///< what this frame says of the first one
+  bool rest_was_touched = false;  ///< this frame or one before has shown it: displacements are from no rest
 
   int found() const;  ///< number of markers measured in this frame
   /// Whether the marker was measured in this frame, and its name is sure.
@@ -113,6 +116,7 @@ class MarkerTracker {
   void reject_strays();
   void note_steps(std::int64_t t_us);
   Eigen::Vector2d carried_by_neighbours(std::size_t marker) const;
+  void doubt_rest();
 
   MarkerTrackerSettings settings_;
   std::optional<MarkerFinder> finder_;
@@ -130,6 +134,8 @@ class MarkerTracker {
   std::vector<int> nearest_blob_;
   std::vector<int> nearest_marker_;  ///< of each blob
   std::vector<std::uint8_t> claimed_;
+  std::vector<std::uint8_t> found_;
+  std::vector<MarkerTriple> triples_;  ///< at rest
 };
 
 }  // namespace touchstone::sensors

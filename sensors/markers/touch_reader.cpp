@@ -88,7 +88,7 @@ const TouchReading& TouchReader::read(const Frame& frame) {
   reading_.light = markers.light;
   const bool lit = markers.light == FrameLight::kNormal;
   if (lit) frame.image.copyTo(before_);  // the next frame's motion is that since the gel was seen
-  reading_.trusted = lit && !markers.jumped;
+  reading_.trusted = lit && !markers.jumped && !markers.rest_was_touched;
   reading_.motion_ratio = motion.ratio;
   reading_.markers_found = markers.found();
   read_heights(frame, markers, diameter_px);

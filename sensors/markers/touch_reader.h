@@ -61,7 +61,8 @@ struct TouchReading {
   int markers_found = 0;
   /// Of the frame. Where it isn't normal nothing is measured: heights and forces mean nothing, markers are held.
   FrameLight light = FrameLight::kNormal;
-  bool trusted = false;  ///< it has light, markers have their own names, and heights aren't of an overexposed frame
+  bool trusted = false;  ///< it has light, markers have their own names, no frame so far has shown that the
+                         ///< gel at rest was touched, and heights aren't of an overexposed frame
 };
 
 /// Reads the frames of one sensor, in their order. One object is for one thread.

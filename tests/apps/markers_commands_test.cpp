@@ -61,6 +61,64 @@ class MarkersCommand : public ::testing::Test {
   MarkerPicture picture_ = {.diameter_px = 9.0, .noise = 1.0};
 };
 
+TEST_F(MarkersCommand, AFirstFrameThatIsTouchedGivesWayToALaterOne) {
+  const auto touched = [&](double most_px) {
+    std::vector<Eigen::Vector2d> places = moved({0.0, 0.0});
+    for (Eigen::Vector2d& place : places) {
+      const Eigen::Vector2d from = (place - Eigen::Vector2d(150.0, 120.0)) / 40.0;
+      place += 1.65 * most_px * from * std::exp(-0.5 * from.squaredNorm());
+    }
+    return paint_markers(picture_, places);
+  };
+  for (const char* const name : {"touched", "untouched"}) fs::create_directories(folder_.path() / name);
+  const std::vector<double> presses = {5.0, 4.0, 2.0, 0.0, 0.0, 3.0};
+  for (std::size_t i = 0; i < presses.size(); ++i) {
+    sim::write_png(folder_.path() / fmt::format("touched/{}.png", i), touched(presses[i]));
+    sim::write_png(folder_.path() / fmt::format("untouched/{}.png", i), touched(presses[presses.size() - 2 - i % 5]));
+  }
+  const auto run = run_program({"estimate", "markers", in("touched"), "-o", in("out"), "--touch"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.err, ::testing::ContainsRegex("touched: the first frame is touched: frame [34], whose rows are "
+                                                "straightest, is taken for the gel at rest"));
+  std::istringstream csv(read_whole_file(folder_.path() / "out/markers.csv"));
+  std::string line;
+  std::getline(csv, line);
+  double most_first = 0.0, most_at_rest = 0.0;
+  int lines = 0;
+  while (std::getline(csv, line)) {
+    const std::vector<std::string> cells = cells_of(line);
+    const double moved_px = std::hypot(std::stod(cells[7]), std::stod(cells[8]));
+    if (cells[1] == "0") most_first = std::max(most_first, moved_px);
+    if (cells[1] == "3" || cells[1] == "4") most_at_rest = std::max(most_at_rest, moved_px);
+    ++lines;
+  }
+  EXPECT_EQ(lines, 6 * kMarkers);
+  EXPECT_NEAR(most_first, 5.0, 0.4);
+  EXPECT_LT(most_at_rest, 0.3);
+  const auto other = run_program({"estimate", "markers", in("untouched"), "-o", in("other"), "--touch"});
+  ASSERT_EQ(other.exit_code, 0) << other.err;
+  EXPECT_THAT(other.err, Not(HasSubstr("is touched")));
+}
+
+TEST_F(MarkersCommand, PicturesMakeAVideoAndTablesAReport) {
+  const auto run = run_program({"estimate", "markers", in("frames"), "-o", in("out"), "--touch", "--overlay", "--video",
+                                in("seen.mp4"), "--rate", "25"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("seen.mp4: shown as fast as it was"));
+  EXPECT_GT(fs::file_size(folder_.path() / "seen.mp4"), 1000U);
+  const auto report = run_program({"inspect", in("out"), "-o", in("report.html")});
+  ASSERT_EQ(report.exit_code, 0) << report.err;
+  EXPECT_THAT(report.out, HasSubstr("report.html: 2 tables, pictures of "));
+  EXPECT_THAT(read_whole_file(folder_.path() / "report.html"),
+              AllOf(HasSubstr("size of displacement"), HasSubstr("touch.csv"), HasSubstr("4 of 4 frames")));
+  const auto one = run_program({"inspect", in("out/touch.csv"), "-o", in("one.html")});
+  EXPECT_THAT(one.out, HasSubstr("one.html: 1 table, pictures of "));
+  test::expect_refused(run_program({"inspect", in("out"), "-o", in("sheet.png")}), "is an .html file");
+  test::expect_refused(run_program({"inspect", in("frames"), "-o", in("r.html")}), "nor a folder with tables");
+  test::expect_refused(run_program({"estimate", "markers", in("frames"), "-o", in("o2"), "--video", in("a.avi")}),
+                       "must end in .mp4");
+}
+
 TEST_F(MarkersCommand, FramesGiveDisplacementsAndPictures) {
   const auto run = run_program({"estimate", "markers", in("frames"), "-o", in("out"), "--overlay", "--rate", "25"});
   ASSERT_EQ(run.exit_code, 0) << run.err;

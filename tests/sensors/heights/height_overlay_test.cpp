@@ -39,6 +39,22 @@ TEST(HeightOverlay, ShowsTheContactOnTheFrameAndTheHeightsBesideIt) {
   EXPECT_EQ(picture.at<cv::Vec3b>(40, 50), cv::Vec3b(40, 40, 230)) << "not to be trusted: red";
 }
 
+TEST(HeightOverlay, DrawsDarknessOfAGreyFrameTheSameWay) {
+  const HeightResult same = disc();
+  DarknessResult result;
+  result.height_mm = same.height_mm;
+  result.contact = same.contact;
+  cv::Mat grey, colour;
+  draw_overlay(cv::Mat(60, 80, CV_8UC1, cv::Scalar(90)), result, 1.0, grey);
+  draw_overlay(cv::Mat(60, 80, CV_8UC3, cv::Scalar(90, 90, 90)), same, 1.0, colour);
+  EXPECT_EQ(cv::norm(grey, colour, cv::NORM_INF), 0.0);
+  result.dark = true;
+  draw_overlay(cv::Mat(60, 80, CV_8UC1, cv::Scalar(90)), result, 1.0, grey);
+  EXPECT_EQ(grey.at<cv::Vec3b>(40, 50), cv::Vec3b(40, 40, 230));
+  EXPECT_THAT(test::message_of([&] { draw_overlay(cv::Mat(60, 80, CV_16UC1), result, 1.0, grey); }),
+              HasSubstr("1 or 3 channels"));
+}
+
 TEST(HeightOverlay, RefusesWhatDoesntFit) {
   const HeightResult result = disc();
   cv::Mat picture;
