@@ -9,6 +9,8 @@
 namespace touchstone {
 namespace {
 
+constexpr double kKnee = 6.0 / 29.0;  // of CIE 1976's cube root
+
 /// Columns: the primaries' chromaticities of ITU-R BT.709, scaled so that their sum is D65.
 const Eigen::Matrix3d& primaries() {
   static const Eigen::Matrix3d matrix = [] {
@@ -50,10 +52,16 @@ Eigen::Vector3d xyz_from_linear_srgb(const Eigen::Vector3d& linear) {
 }
 
 Eigen::Vector3d lab_from_xyz(const Eigen::Vector3d& xyz) {
-  constexpr double kKnee = 6.0 / 29.0;
   const Eigen::Vector3d f = xyz.cwiseQuotient(kD65White).unaryExpr(
       [](double t) { return t > kKnee * kKnee * kKnee ? std::cbrt(t) : t / (3.0 * kKnee * kKnee) + 4.0 / 29.0; });
   return {116.0 * f.y() - 16.0, 500.0 * (f.x() - f.y()), 200.0 * (f.y() - f.z())};
+}
+
+Eigen::Vector3d xyz_from_lab(const Eigen::Vector3d& lab) {
+  const double y = (lab.x() + 16.0) / 116.0;
+  const Eigen::Vector3d f(y + lab.y() / 500.0, y, y - lab.z() / 200.0);
+  const auto share = [](double at) { return at > kKnee ? at * at * at : 3.0 * kKnee * kKnee * (at - 4.0 / 29.0); };
+  return f.unaryExpr(share).cwiseProduct(kD65White);
 }
 
 Eigen::Vector3d lab_from_srgb(const Eigen::Vector3d& srgb) {

@@ -19,6 +19,8 @@ Eigen::Vector3d xyz_from_linear_srgb(const Eigen::Vector3d& linear);
 
 /// (L*, a*, b*) beside a white of kD65White [ISO11664, part 4].
 Eigen::Vector3d lab_from_xyz(const Eigen::Vector3d& xyz);
+/// The inverse.
+Eigen::Vector3d xyz_from_lab(const Eigen::Vector3d& lab);
 /// Of an sRGB colour.
 Eigen::Vector3d lab_from_srgb(const Eigen::Vector3d& srgb);
 

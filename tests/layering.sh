@@ -41,7 +41,7 @@ sensors/colour: core sensors/models sensors/image sensors/markers
 sensors/tractions: core sensors/numerics sensors/models sensors/beads sensors/markers sensors/colour
 sensors/events: core sensors/models sensors/learning
 sensors/reflex: core sensors/models
-sensors/skin: core
+sensors/skin: core sensors/models sensors/learning sensors/events
 sim/files: core fem/mesh render/spectra
 sim/relief: core fem/shapes sim/files
 sim/scene: core fem/mesh fem/elements fem/shapes fem/contact fem/fine_relief render/materials render/scene render/cameras render/imager render/events sim/files sim/relief
@@ -54,7 +54,7 @@ sim/cost: core fem/mesh fem/elements fem/shapes fem/contact fem/finite_strain fe
 sim/grasp: core fem/mesh fem/elements fem/contact fem/error fem/fine_relief fem/vibration sim/scene sim/press
 datasets/jobs: core render/lamps sim/relief sim/scene sim/plan sim/press sim/sensor sim/need
 datasets/sets: core fem/elements sensors/events sim/files sim/scene sim/plan sim/need sim/press sim/view sim/sensor sim/cost datasets/jobs
-datasets/sources: core sim/files datasets/jobs datasets/sets
+datasets/sources: core sensors/events sim/files datasets/jobs datasets/sets
 datasets/exports: core sim/files datasets/sets
 datasets/inspection: core plots render/cameras render/imager sim/files sim/scene sim/plan sim/view datasets/jobs datasets/sets
 lab/statistics: core
@@ -67,16 +67,16 @@ lab/vhs: core closed_forms fem/elements fem/contact render/materials render/scen
 lab/gelsight: core closed_forms fem/shapes fem/contact sensors/heights sensors/touch_map sensors/texture sensors/markers sim/files sim/scene sim/sensor sim/grasp datasets/sets datasets/sources datasets/inspection lab/validation
 lab/dtact: core sensors/heights sim/files datasets/sets datasets/sources datasets/inspection lab/gelsight
 lab/chroma: core plots fem/contact fem/finite_strain render/spectra render/scene render/cameras render/paths render/imager sensors/colour sensors/tractions sim/scene sim/plan sim/press sim/view sim/sensor datasets/sets datasets/sources datasets/inspection lab/statistics lab/validation lab/press lab/gelsight
-lab/dvs: core render/membrane render/events sensors/learning sensors/events sim/scene sim/press sim/sensor sim/grasp datasets/sets datasets/inspection lab/validation
-lab/reflex: core fem/contact fem/finite_strain render/cameras render/paths render/direct render/imager sensors/reflex sim/scene sim/plan sim/press sim/view datasets/sets lab/validation
+lab/dvs: core render/membrane render/events sensors/learning sensors/events sim/scene sim/press sim/sensor sim/grasp datasets/sets datasets/sources datasets/inspection lab/validation
+lab/reflex: core fem/contact fem/finite_strain render/cameras render/paths render/direct render/imager sensors/reflex sim/files sim/scene sim/plan sim/press sim/view datasets/sets datasets/sources datasets/inspection lab/validation
 lab/studies: core plots fem/mesh fem/elements fem/shapes fem/contact render/sampling render/imager sensors/beads sensors/tractions sim/scene sim/plan sim/press sim/view sim/sensor datasets/jobs lab/validation lab/press lab/vhs lab/chroma
 lab/bench: core plots fem/mesh fem/elements fem/shapes fem/contact fem/error render/cameras render/imager sensors/beads sensors/heights sim/files sim/scene sim/plan sim/press sim/view sim/sensor sim/need sim/cost datasets/sets lab/statistics lab/vhs lab/gelsight lab/studies
 lab/likeness: core render/imager sensors/heights sim/files sim/scene sim/sensor datasets/sets datasets/inspection lab/gelsight
 lab/fit: core render/imager sensors/heights sim/files sim/relief sim/scene sim/press sim/view sim/sensor datasets/jobs datasets/sets datasets/inspection lab/validation lab/gelsight lab/studies lab/likeness
 lab/schema: core sim/scene datasets/jobs lab/vhs lab/studies lab/fit
 apps: core plots render/imager sensors/tractions sensors/events sim/files sim/scene sim/plan sim/press sim/view sim/sensor sim/need sim/cost datasets/jobs datasets/sets datasets/sources datasets/exports datasets/inspection lab/validation lab/press lab/device lab/dvs lab/studies lab/bench lab/likeness lab/fit lab/schema
-apps/estimators: core sensors/beads sensors/heights sensors/touch_map sensors/texture sensors/markers sensors/colour sensors/tractions sensors/events sim/files datasets/sets datasets/sources lab/vhs lab/gelsight lab/dtact lab/chroma lab/dvs apps
-python: core sensors/learning sensors/beads sensors/heights sensors/touch_map sensors/texture sensors/markers sensors/colour sensors/events sim/files sim/scene sim/press sim/sensor datasets/jobs datasets/sets datasets/sources
+apps/estimators: core sensors/beads sensors/heights sensors/touch_map sensors/texture sensors/markers sensors/colour sensors/tractions sensors/events sensors/reflex sensors/skin sim/files datasets/sets datasets/sources lab/vhs lab/gelsight lab/dtact lab/chroma lab/dvs lab/reflex apps
+python: core sensors/learning sensors/beads sensors/heights sensors/touch_map sensors/texture sensors/markers sensors/colour sensors/events sensors/reflex sensors/skin sim/files sim/scene sim/press sim/sensor datasets/jobs datasets/sets datasets/sources
 testing: core sim/files sim/press sim/sensor datasets/jobs lab/device
 END
 )

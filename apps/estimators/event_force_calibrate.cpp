@@ -5,8 +5,8 @@
 #include "apps/command.h"
 #include "apps/estimators/event_options.h"
 #include "apps/progress_bar.h"
-#include "lab/dvs/grasp_calibration.h"
 #include "sensors/events/grasp_force_model_file.h"
+#include "sensors/events/grasp_training.h"
 
 namespace touchstone::apps {
 namespace {
@@ -14,19 +14,19 @@ namespace {
 struct CalibrateOptions {
   std::filesystem::path grasps, out;
   std::string method = "process";
-  lab::GraspForceTraining training;
+  sensors::GraspForceTraining training;
 };
 
 void calibrate(const CalibrateOptions& options, const EventOptions& events, const GlobalOptions& global) {
   require_writable_place(options.out);
-  lab::GraspForceTraining training = options.training;
+  sensors::GraspForceTraining training = options.training;
   training.threads = global.threads;
-  if (options.method == "network") training.method = lab::GraspForceMethod::network;
+  if (options.method == "network") training.method = sensors::GraspForceMethod::network;
   const lab::SeenGrasps grasps = seen_grasps(options.grasps, lab::GraspNeeds::forces, events, global);
-  lab::GraspForceCalibration made;
+  sensors::GraspForceCalibration made;
   {
     ProgressBar bar(global.quiet);
-    made = lab::calibrate_grasp_force(grasps.seen, training, bar.listener());
+    made = sensors::calibrate_grasp_force(grasps.seen, training, bar.listener());
   }
   sensors::save(made.model, options.out);
   fmt::print("{}: learnt from {} windows of {} grasps\n", options.out.string(), made.windows, grasps.seen.size());

@@ -5,7 +5,7 @@
 #include "apps/command.h"
 #include "apps/estimators/event_options.h"
 #include "apps/progress_bar.h"
-#include "lab/dvs/grasp_calibration.h"
+#include "sensors/events/grasp_training.h"
 #include "sensors/events/material_classifier_file.h"
 
 namespace touchstone::apps {
@@ -19,10 +19,10 @@ struct CalibrateOptions {
 void calibrate(const CalibrateOptions& options, const EventOptions& events, const GlobalOptions& global) {
   require_writable_place(options.out);
   const lab::SeenGrasps grasps = seen_grasps(options.grasps, lab::GraspNeeds::materials, events, global);
-  lab::GraspMaterialCalibration made;
+  sensors::GraspMaterialCalibration made;
   {
     ProgressBar bar(global.quiet);
-    made = lab::calibrate_grasp_material(grasps.seen, options.classifier, global.threads, bar.listener());
+    made = sensors::calibrate_grasp_material(grasps.seen, options.classifier, global.threads, bar.listener());
   }
   sensors::save(made.model, options.out);
   fmt::print("{}: learnt from {} grasps of {} materials\n", options.out.string(), grasps.seen.size(),

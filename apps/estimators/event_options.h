@@ -6,7 +6,7 @@
 #include <string>
 
 #include "apps/command.h"
-#include "lab/dvs/grasp_calibration.h"
+#include "lab/dvs/grasp_files.h"
 #include "sensors/events/event_source.h"
 
 namespace touchstone::apps {

@@ -10,6 +10,8 @@
 #include <filesystem>
 #include <utility>
 
+#include "core/error.h"
+
 namespace touchstone::apps {
 namespace {
 
@@ -75,6 +77,14 @@ std::vector<datasets::FrameStream> opened_streams(const SourceOptions& options) 
   std::vector<datasets::FrameStream> streams = datasets::streams_of(choice);
   for (datasets::FrameStream& stream : streams) stream = datasets::watched(std::move(stream), options.notes);
   return streams;
+}
+
+void require_times(const datasets::FrameStream& stream) {
+  if (stream.live) return;
+  const std::unique_ptr<datasets::FrameSource> source = stream.open();
+  datasets::SourceFrame frame;
+  if (!source->next(frame) || !frame.fault.empty() || frame.label.timed) return;
+  fail("{}: when its frames were taken isn't known; --rate HZ, --times CSV or --forces CSV says it", stream.name);
 }
 
 void warn_of_notes(const SourceOptions& options) {

@@ -34,6 +34,9 @@ std::shared_ptr<SourceOptions> add_source_options(CLI::App& command, const std::
 /// @throws Error as datasets::streams_of
 std::vector<datasets::FrameStream> opened_streams(const SourceOptions& options);
 
+/// Of what reads motion: without times it would be of no use. @throws Error if a recording's aren't known
+void require_times(const datasets::FrameStream& stream);
+
 /// Warns of frames that were doubled or dropped before they came here; of many it names some.
 void warn_of_notes(const SourceOptions& options);
 

@@ -3,21 +3,8 @@
 #include <spdlog/spdlog.h>
 
 #include "apps/progress_bar.h"
-#include "core/error.h"
 
 namespace touchstone::apps {
-namespace {
-
-/// A tracker's results without times would be of no use. @throws Error if a recording's aren't known
-void require_times(const datasets::FrameStream& stream) {
-  if (stream.live) return;
-  const std::unique_ptr<datasets::FrameSource> source = stream.open();
-  datasets::SourceFrame frame;
-  if (!source->next(frame) || !frame.fault.empty() || frame.label.timed) return;
-  fail("{}: when its frames were taken isn't known; --rate HZ, --times CSV or --forces CSV says it", stream.name);
-}
-
-}  // namespace
 
 std::shared_ptr<FrameOptions> add_frame_options(CLI::App& command, const std::string& split) {
   auto options = std::make_shared<FrameOptions>();

@@ -1,6 +1,8 @@
 #pragma once
 // The little of CSV that recorded frames' tables need: numbers without blanks, no line's end within quotes.
 
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -85,6 +87,17 @@ inline std::filesystem::path file_in(const std::filesystem::path& folder, const 
   std::filesystem::path file = folder / cell;
   if (const std::string fault = fault_of_file(file); !fault.empty()) fail_at(where, "file: {}", fault);
   return file;
+}
+
+/// A table's first line, which must be one of those that are allowed. @throws Error naming the file
+inline std::string header_among(const std::filesystem::path& csv, const std::vector<std::string>& allowed) {
+  const std::string text = read_text_file(csv);
+  std::string head = text.substr(0, text.find('\n'));
+  if (!head.empty() && head.back() == '\r') head.pop_back();
+  if (std::find(allowed.begin(), allowed.end(), head) == allowed.end()) {
+    fail_at({csv.string(), 1}, "the first line is '{}'; it must be one of '{}'", head, fmt::join(allowed, "', '"));
+  }
+  return head;
 }
 
 /// Calls `row(where, cells)` for each line of a table after its first one, which must be `columns`; empty lines are

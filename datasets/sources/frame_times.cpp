@@ -1,9 +1,6 @@
 #include "datasets/sources/frame_times.h"
 
-#include <fmt/ranges.h>
-
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -59,13 +56,7 @@ std::int64_t seconds_to_us(double seconds, const SourceLocation& where) {
 }  // namespace
 
 FrameTimes read_frame_times(const fs::path& csv) {
-  constexpr std::array<const char*, 4> kHeaders = {"file,t_us", "file,t_s", "frame,t_us", "frame,t_s"};
-  const std::string text = read_text_file(csv);
-  std::string head = text.substr(0, text.find('\n'));
-  if (!head.empty() && head.back() == '\r') head.pop_back();
-  if (std::ranges::find(kHeaders, head) == kHeaders.end()) {
-    fail_at({csv.string(), 1}, "the first line is '{}'; it must be one of '{}'", head, fmt::join(kHeaders, "', '"));
-  }
+  const std::string head = header_among(csv, {"file,t_us", "file,t_s", "frame,t_us", "frame,t_s"});
   FrameTimes times;
   times.csv = csv;
   times.by_file = head.starts_with("file");

@@ -1,5 +1,5 @@
 #pragma once
-// Force and material of grasps on disk, by models of lab/dvs/grasp_calibration.h.
+// Force and material of grasps on disk, by models of sensors/events/grasp_training.h.
 
 #include <filesystem>
 #include <string>

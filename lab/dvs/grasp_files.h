@@ -9,17 +9,14 @@
 #include "core/progress.h"
 #include "sensors/events/event_source.h"
 #include "sensors/events/event_windows.h"
-#include "sensors/events/force_readings.h"
-#include "sensors/events/force_series.h"
-#include "sensors/events/grasp_sequence.h"
-#include "sensors/events/material_classifier.h"
+#include "sensors/events/known_grasp.h"
 
 namespace touchstone::lab {
 
 /// A line of a table of grasps.
 struct GraspFiles {
   std::filesystem::path events;
-  std::filesystem::path forces;  ///< empty where the table has none
+  std::filesystem::path forces;  ///< of datasets::read_force_readings; empty where the table has none
   std::string material;          ///< likewise
 };
 
@@ -30,20 +27,9 @@ enum class GraspNeeds { forces, materials };
 /// @throws Error with file and line
 std::vector<GraspFiles> read_grasp_table(const std::filesystem::path& csv, GraspNeeds needs);
 
-/// Forces beside a recording: a CSV with the header `t_us,force_N`, in the order of time, on the events' clock.
-/// @throws Error with file and line
-sensors::ForceReadings read_force_readings(const std::filesystem::path& csv);
-
-/// A grasp from first touch to the end of its release.
-struct SeenGrasp {
-  GraspFiles files;
-  sensors::GraspSequence sequence;
-  Eigen::VectorXd force_N;  ///< mean of each of the sequence's windows; empty without forces
-};
-
 /// Grasps that can be used, and what is wrong with the others.
 struct SeenGrasps {
-  std::vector<SeenGrasp> seen;
+  std::vector<sensors::KnownGrasp> seen;
   std::vector<std::string> faults;  ///< naming the file: damaged, no touch, no release, forces that end too early
 };
 
@@ -55,13 +41,5 @@ SeenGrasps read_grasps(const std::vector<GraspFiles>& table, const sensors::Even
 /// The windows that the commands use, for a file's camera and first event. @throws Error naming the file if its
 /// camera's size isn't known, or there is no event
 sensors::EventWindowSettings windows_for(const std::filesystem::path& events, const sensors::EventReadOptions& options);
-
-/// Inputs and force of the judged windows. @param with_time for a Gaussian process: ON, OFF and time; else counts
-std::vector<sensors::ForceSeries> force_series_of(const std::vector<SeenGrasp>& grasps, bool with_time);
-
-/// Counts of the judged windows, with the index of the grasp's material in `materials`, which is filled by first
-/// appearance.
-std::vector<sensors::MaterialSample> material_samples_of(const std::vector<SeenGrasp>& grasps,
-                                                         std::vector<std::string>& materials);
 
 }  // namespace touchstone::lab

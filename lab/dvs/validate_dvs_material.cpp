@@ -6,10 +6,10 @@
 #include <string>
 
 #include "core/error.h"
-#include "lab/dvs/dvs_material_experiment.h"
 #include "lab/dvs/dvs_row_recordings.h"
 #include "lab/dvs/dvs_sequences.h"
 #include "lab/validation/row_list.h"
+#include "sensors/events/material_trial.h"
 
 namespace touchstone::lab {
 namespace {
@@ -79,17 +79,18 @@ void add_tables(std::span<const sensors::MaterialSample> samples, const Validate
     const char* id;
     const char* what;
     const TextTable& text;
-    sensors::ConfusionMatrix DvsMaterialScore::*matrix;
+    sensors::ConfusionMatrix sensors::MaterialTrialScore::*matrix;
   };
-  const std::array<Table, 2> tables = {{{"table4", "validation grasps", kTable4, &DvsMaterialScore::validation},
-                                        {"table5", "test grasps", kTable5, &DvsMaterialScore::test}}};
+  const std::array<Table, 2> tables = {
+      {{"table4", "validation grasps", kTable4, &sensors::MaterialTrialScore::validation},
+       {"table5", "test grasps", kTable5, &sensors::MaterialTrialScore::test}}};
   for (int layers = 1; layers <= static_cast<int>(kTable4.size()); ++layers) {
-    std::array<DvsMaterialScore, kUnits.size()> scores;
+    std::array<sensors::MaterialTrialScore, kUnits.size()> scores;
     for (std::size_t n = 0; n < kUnits.size(); ++n) {
-      DvsMaterialSettings settings;
+      sensors::MaterialTrialSettings settings;
       settings.classifier.hidden_layers = layers;
       settings.classifier.units = kUnits[n];
-      scores[n] = test_material_classifiers(samples, names(), settings, options.progress);
+      scores[n] = sensors::test_material_classifiers(samples, names(), settings, options.progress);
     }
     for (const Table& table : tables) {
       const auto& text = table.text[static_cast<std::size_t>(layers - 1)];
@@ -121,8 +122,9 @@ std::vector<ValidationRow> validate_dvs_material(const ValidateOptions& options)
   const DvsSequences sequences = dvs_sequences(*dvs_row_recordings(options));
   const std::vector<sensors::MaterialSample> samples = event_samples(sequences.seen);
   const auto grasps = static_cast<int>(samples.size());
-  const DvsMaterialSettings settings;
-  const DvsMaterialScore score = test_material_classifiers(samples, names(), settings, options.progress);
+  const sensors::MaterialTrialSettings settings;
+  const sensors::MaterialTrialScore score =
+      sensors::test_material_classifiers(samples, names(), settings, options.progress);
   const double right = score.test.accuracy();
   add_share(
       rows, "accuracy_percent",
@@ -135,8 +137,8 @@ std::vector<ValidationRow> validate_dvs_material(const ValidateOptions& options)
             score.test.counts.topRows(kSoft.size()).sum());
   add_share(rows, "steel_percent", "of steel", kPublishedSteel, score.test.accuracy(kSteel),
             score.test.counts.bottomRows(1).sum());
-  const DvsMaterialScore by_force =
-      test_material_classifiers(force_sensor_samples(sequences.seen), names(), settings, options.progress);
+  const sensors::MaterialTrialScore by_force =
+      sensors::test_material_classifiers(force_sensor_samples(sequences.seen), names(), settings, options.progress);
   const double force_right = by_force.test.accuracy();
   ValidationRow& force =
       add_share(rows, "force_sensor_percent",
@@ -152,7 +154,8 @@ std::vector<ValidationRow> validate_dvs_material(const ValidateOptions& options)
     for (const Alike& alike : kAlike) {
       const std::vector<sensors::MaterialSample> grasped =
           event_samples(dvs_sequences(*dvs_alike_recordings(options, alike.id, alike.spread)).seen);
-      const DvsMaterialScore classified = test_material_classifiers(grasped, names(), settings, options.progress);
+      const sensors::MaterialTrialScore classified =
+          sensors::test_material_classifiers(grasped, names(), settings, options.progress);
       add_share(rows, alike.id, fmt::format("{}: {}", alike.title, matrix_text(classified.test)), kPublished,
                 classified.test.accuracy(), static_cast<int>(grasped.size()));
     }

@@ -12,21 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kMarkColumns = "u_px,v_px,x_mm,y_mm";
-
 }  // namespace
-
-sensors::PlaceMap read_place_map(const fs::path& csv, const cv::Size& size) {
-  std::vector<Eigen::Vector2d> pixels, places;
-  datasets::for_each_row(csv, kMarkColumns, [&](const SourceLocation& where, const std::vector<std::string>& cells) {
-    const auto number = [&](std::size_t i, const char* field) { return datasets::number_in(cells[i], field, where); };
-    pixels.emplace_back(number(0, "u_px") - 0.5, number(1, "v_px") - 0.5);  // continuous indices
-    places.emplace_back(number(2, "x_mm"), number(3, "y_mm"));
-  });
-  sensors::PlaceMap map;
-  datasets::naming(csv, [&] { map = sensors::fit_place_map(pixels, places, size); });
-  return map;
-}
 
 PlaceReader::PlaceReader(HeightSource& source, fs::path marks) : source_(source), marks_(std::move(marks)) {}
 

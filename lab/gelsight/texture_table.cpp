@@ -6,28 +6,12 @@
 #include "core/whole_file.h"
 #include "datasets/inspection/on_picture.h"
 #include "datasets/sets/csv_cells.h"
+#include "lab/gelsight/label_table.h"
 
 namespace touchstone::lab {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr const char* kLabelColumns = "file,material";
-
-struct LabelledMap {
-  fs::path file;
-  std::string material;
-};
-
-std::vector<LabelledMap> read_labels(const fs::path& folder, const fs::path& csv) {
-  std::vector<LabelledMap> table;
-  datasets::for_each_row(csv, kLabelColumns, [&](const SourceLocation& where, const std::vector<std::string>& cells) {
-    if (cells[1].empty()) fail_at(where, "material: is empty");
-    table.push_back({datasets::file_in(folder, cells[0], where), cells[1]});
-  });
-  if (table.empty()) fail("{}: has no line with a file", csv.string());
-  return table;
-}
 
 /// The model without samples that `use` refuses.
 template <typename Use>
@@ -71,7 +55,7 @@ void judge_left_out(const std::vector<int>& map_of, TextureCalibration& made) {
 
 TextureCalibration learn_textures(HeightSource& source, const fs::path& folder, const fs::path& labels,
                                   const TextureLearning& how, const Progress& progress) {
-  const std::vector<LabelledMap> table = read_labels(folder, labels);
+  const std::vector<LabelledMap> table = read_label_table(folder, labels);
   TextureCalibration made;
   made.model.op = how.op;
   made.model.gray_step_mm = how.gray_step_mm;

@@ -86,5 +86,13 @@ TEST(CieColour, HuesOfTheDoubleConeAreTheirCorners) {
   EXPECT_NEAR((srgb_from_hsl(30, 0.5, 0.75) - Eigen::Vector3d(0.875, 0.75, 0.625)).norm(), 0.0, 1e-12);
 }
 
+TEST(CieColour, XyzAndLabAreEachOthersInverse) {
+  for (const Eigen::Vector3d& lab :
+       {Eigen::Vector3d(0, 0, 0), {5, 1, -2}, {8, 0, 0}, {50, 40, -60}, {100, 0, 0}, {97, -20, 90}}) {
+    EXPECT_NEAR((lab_from_xyz(xyz_from_lab(lab)) - lab).norm(), 0.0, 1e-9);
+  }
+  EXPECT_NEAR((xyz_from_lab({100, 0, 0}) - kD65White).norm(), 0.0, 1e-12);
+}
+
 }  // namespace
 }  // namespace touchstone

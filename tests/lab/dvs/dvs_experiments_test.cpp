@@ -9,7 +9,7 @@
 #include "core/error.h"
 #include "core/random.h"
 #include "lab/dvs/dvs_force_experiment.h"
-#include "lab/dvs/dvs_material_experiment.h"
+#include "sensors/events/material_trial.h"
 
 namespace touchstone::lab {
 namespace {
@@ -212,31 +212,34 @@ TEST(DvsMaterialExperiment, TellsMaterialsByEventsAndNotByForce) {
   std::vector<DvsRecording> recordings;
   for (int i = 0; i < 24; ++i) recordings.push_back(made(i % 4, 1.8 + 0.05 * (i / 4), static_cast<std::uint64_t>(i)));
   const std::vector<DvsSequence> sequences = dvs_sequences(recordings).seen;
-  DvsMaterialSettings settings;
+  sensors::MaterialTrialSettings settings;
   settings.classifier.hidden_layers = 1;
   settings.classifier.units = 10;
   settings.classifier.patience = 30;  // four grasps to validate on stop it early and by chance
-  const DvsMaterialScore by_events = test_material_classifiers(event_samples(sequences), kMaterials, settings);
+  const sensors::MaterialTrialScore by_events =
+      sensors::test_material_classifiers(event_samples(sequences), kMaterials, settings);
   EXPECT_EQ(by_events.test.counts.sum(), 24);
   EXPECT_EQ(by_events.validation.counts.sum(), 24 * 4);
   EXPECT_GT(by_events.test.accuracy(), 0.75) << "of 24, 20 to train on: neighbours are mixed up at times";
-  const DvsMaterialScore by_force = test_material_classifiers(force_sensor_samples(sequences), kMaterials, settings);
+  const sensors::MaterialTrialScore by_force =
+      sensors::test_material_classifiers(force_sensor_samples(sequences), kMaterials, settings);
   EXPECT_LT(by_force.test.accuracy(), 0.55) << "a guess is right in a quarter of all";
   settings.threads = 1;
-  EXPECT_EQ(test_material_classifiers(event_samples(sequences), kMaterials, settings).test.counts,
+  EXPECT_EQ(sensors::test_material_classifiers(event_samples(sequences), kMaterials, settings).test.counts,
             by_events.test.counts);
 }
 
 TEST(DvsMaterialExperiment, RefusesAMissingMaterial) {
   std::vector<sensors::MaterialSample> samples = event_samples(dvs_sequences(some(12)).seen);
   EXPECT_THAT(error_of([&] {
-                test_material_classifiers(samples, {"foam", "rubber", "silicone"}, {});
+                sensors::test_material_classifiers(samples, {"foam", "rubber", "silicone"}, {});
               }),
               HasSubstr("of material 3, there are 3"));
   for (sensors::MaterialSample& sample : samples) {
     if (sample.label == 2) sample.label = 1;
   }
-  EXPECT_THAT(error_of([&] { test_material_classifiers(samples, kMaterials, {}); }), HasSubstr("0 grasps of silicone"));
+  EXPECT_THAT(error_of([&] { sensors::test_material_classifiers(samples, kMaterials, {}); }),
+              HasSubstr("0 grasps of silicone"));
 }
 
 }  // namespace

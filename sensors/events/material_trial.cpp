@@ -1,19 +1,19 @@
-#include "lab/dvs/dvs_material_experiment.h"
+#include "sensors/events/material_trial.h"
 
 #include "core/error.h"
 #include "core/seconds_since.h"
 #include "sensors/learning/leave_one_out.h"
 
-namespace touchstone::lab {
+namespace touchstone::sensors {
 
-DvsMaterialScore test_material_classifiers(std::span<const sensors::MaterialSample> samples,
-                                           const std::vector<std::string>& materials,
-                                           const DvsMaterialSettings& settings, const Progress& progress) {
+MaterialTrialScore test_material_classifiers(std::span<const MaterialSample> samples,
+                                             const std::vector<std::string>& materials,
+                                             const MaterialTrialSettings& settings, const Progress& progress) {
   std::vector<int> labels;
   std::vector<int> of_each(materials.size(), 0);
-  for (const sensors::MaterialSample& sample : samples) {
+  for (const MaterialSample& sample : samples) {
     if (sample.label < 0 || static_cast<std::size_t>(sample.label) >= materials.size()) {
-      fail("dvs material: a grasp is of material {}, there are {}", sample.label, materials.size());
+      fail("event material: a grasp is of material {}, there are {}", sample.label, materials.size());
     }
     labels.push_back(sample.label);
     ++of_each[static_cast<std::size_t>(sample.label)];
@@ -22,10 +22,11 @@ DvsMaterialScore test_material_classifiers(std::span<const sensors::MaterialSamp
   constexpr int kLeast = 3;
   for (std::size_t i = 0; i < materials.size(); ++i) {
     if (of_each[i] < kLeast) {
-      fail("dvs material: {} grasps of {}; at least {} of each material are needed", of_each[i], materials[i], kLeast);
+      fail("event material: {} grasps of {}; at least {} of each material are needed", of_each[i], materials[i],
+           kLeast);
     }
   }
-  const std::vector<sensors::Fold> folds = sensors::folds_by_class(labels, settings.seed);
+  const std::vector<Fold> folds = folds_by_class(labels, settings.seed);
   struct Guesses {
     int test = 0;
     std::vector<int> validation;
@@ -33,19 +34,19 @@ DvsMaterialScore test_material_classifiers(std::span<const sensors::MaterialSamp
   };
   std::vector<Guesses> guesses(folds.size());
   const auto work = [&](int at) {
-    const sensors::Fold& fold = folds[static_cast<std::size_t>(at)];
+    const Fold& fold = folds[static_cast<std::size_t>(at)];
     Guesses& mine = guesses[static_cast<std::size_t>(at)];
     const double begun = thread_seconds();
-    const sensors::TrainedMaterialClassifier trained = sensors::train_material_classifier(
-        samples, materials, fold.training, fold.validation, settings.classifier, fold.test);
+    const TrainedMaterialClassifier trained =
+        train_material_classifier(samples, materials, fold.training, fold.validation, settings.classifier, fold.test);
     mine.training_s = thread_seconds() - begun;
     const auto guess = [&](int grasp) {
-      return sensors::classify(trained.model, samples[static_cast<std::size_t>(grasp)].features).label;
+      return classify(trained.model, samples[static_cast<std::size_t>(grasp)].features).label;
     };
     mine.test = guess(fold.test);
     for (const int grasp : fold.validation) mine.validation.push_back(guess(grasp));
   };
-  sensors::run_folds(static_cast<int>(folds.size()), settings.threads, work, progress);
+  run_folds(static_cast<int>(folds.size()), settings.threads, work, progress);
 
   std::vector<int> tested, validated, validation_truth;
   double training_s = 0.0;
@@ -58,8 +59,8 @@ DvsMaterialScore test_material_classifiers(std::span<const sensors::MaterialSamp
     }
   }
   const auto classes = static_cast<int>(materials.size());
-  return {sensors::confusion_matrix(labels, tested, classes),
-          sensors::confusion_matrix(validation_truth, validated, classes), training_s};
+  return {confusion_matrix(labels, tested, classes), confusion_matrix(validation_truth, validated, classes),
+          training_s};
 }
 
-}  // namespace touchstone::lab
+}  // namespace touchstone::sensors
