@@ -17,6 +17,17 @@ double mean_of_times(const GrabbedImage& grabbed) {
   return 0.5e-6 * static_cast<double>(grabbed.first_us + grabbed.last_us);
 }
 
+/// What a model learns from.
+sensors::ReflexRecording samples_of(std::span<const ReflexPoint> points, bool with_shear) {
+  sensors::ReflexRecording recording;
+  for (const ReflexPoint& one : points) {
+    sensors::ReflexSample& sample = recording.emplace_back();
+    sample = {one.statistics, one.truth.contact, one.truth.normal_N};
+    if (with_shear) sample.shear_N = one.truth.shear_N;
+  }
+  return recording;
+}
+
 }  // namespace
 
 ReflexMotion reciprocation(double from_mm, double to_mm, double speed_mm_s) {
@@ -50,16 +61,8 @@ std::vector<ReflexPoint> record_points(const ReflexSetup& setup, const ReflexTou
 
 sensors::ReflexModel train_reflex(std::span<const ReflexPoint> points, int degree,
                                   const sensors::ContactTreeSettings& tree) {
-  std::vector<sensors::ContactSample> contact;
-  std::vector<sensors::StatisticsForceSample> force;
-  for (const ReflexPoint& one : points) {
-    contact.push_back({one.statistics, one.truth.contact});
-    if (one.truth.contact) force.push_back({one.statistics, one.truth.normal_N});
-  }
-  sensors::ReflexModel model;
-  model.tree = sensors::train_contact_tree(contact, tree);
-  model.force = sensors::fit_statistics_force(force, degree);
-  return model;
+  const sensors::ReflexRecording recording = samples_of(points, false);
+  return sensors::train_reflex({&recording, 1}, {.degree = degree, .tree = tree}).model;
 }
 
 ReflexScore score_reflex(const sensors::ReflexModel& model, std::span<const ReflexPoint> points) {
@@ -190,17 +193,7 @@ ExploreScore score_explore(const sensors::ExploreModel& model, std::span<const s
 
 std::vector<sensors::ShearSample> reflex_shear_samples(const sensors::ReflexModel& model,
                                                        std::span<const ReflexPoint> points, int every) {
-  TS_ASSERT(every >= 1);
-  sensors::MotionCounts counts;
-  std::vector<sensors::ShearSample> samples;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const ChipStatistics& statistics = points[i].statistics;
-    const bool present = sensors::force_present(model.tree, statistics);
-    const Eigen::Vector2d sum = counts.next(statistics, present);
-    if (!present || (i + 1) % static_cast<std::size_t>(every) != 0) continue;
-    samples.push_back({sum, model.force.force_N(statistics), points[i].truth.shear_N});
-  }
-  return samples;
+  return sensors::shear_samples(model, samples_of(points, true), every);
 }
 
 std::vector<sensors::ShearSample> explore_shear_samples(const sensors::ExploreModel& model,

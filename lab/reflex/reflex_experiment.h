@@ -12,6 +12,7 @@
 #include "sensors/reflex/explore_model.h"
 #include "sensors/reflex/explore_tracker.h"
 #include "sensors/reflex/reflex_loop.h"
+#include "sensors/reflex/reflex_training.h"
 
 namespace touchstone::lab {
 

@@ -13,6 +13,7 @@ namespace {
 
 constexpr const char* kWhose = "force spectrogram: ";
 constexpr int kLeastWindow = 4;
+constexpr double kMostSamples = 1 << 24;  // of a window, and of the numbers of a picture
 
 int window_samples(double rate_Hz, const ForceSpectrogramSettings& settings) {
   check_above_zero(kWhose, rate_Hz, "rate_Hz");
@@ -22,6 +23,13 @@ int window_samples(double rate_Hz, const ForceSpectrogramSettings& settings) {
   check_above_zero(kWhose, settings.trigger_N, "trigger_N");
   check_at_least_zero(kWhose, settings.before_s, "before_s");
   check_above_zero(kWhose, settings.floor_N, "floor_N");
+  // As numbers first: what is too many is beyond a whole number, too.
+  const double windows = 1.0 + (settings.length_s - settings.window_s) / settings.hop_s;
+  if (!(settings.window_s * rate_Hz <= kMostSamples && settings.length_s * rate_Hz <= 1e12 &&
+        settings.before_s * rate_Hz <= 1e12 && windows * settings.window_s * rate_Hz <= kMostSamples)) {
+    fail("{}windows of {} s, {} s apart, over {} s at {} Hz are too many; allowed are {} numbers in all", kWhose,
+         settings.window_s, settings.hop_s, settings.length_s, rate_Hz, kMostSamples);
+  }
   const long samples = std::lround(settings.window_s * rate_Hz);
   if (samples < kLeastWindow) {
     fail("{}a window of {} s has {} samples at {} Hz, it needs {}", kWhose, settings.window_s, samples, rate_Hz,

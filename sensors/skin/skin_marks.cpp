@@ -115,6 +115,19 @@ void check(const cv::Mat& before, const cv::Mat& pressed, const SkinMarkSettings
 
 }  // namespace
 
+const char* name_of(SkinMarkKind kind) {
+  switch (kind) {
+    case SkinMarkKind::erythema:
+      return "erythema";
+    case SkinMarkKind::purpura:
+      return "purpura";
+    case SkinMarkKind::unknown:
+      return "unknown";
+  }
+  TS_ASSERT(false);
+  return "";
+}
+
 std::vector<SkinMark> skin_marks(const cv::Mat& before, const cv::Mat& pressed, const SkinMarkSettings& settings) {
   check(before, pressed, settings);
   const IndexMap first = index_map(before, settings, "before pressure");

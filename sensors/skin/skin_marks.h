@@ -20,6 +20,9 @@ enum class SkinMarkKind {
   unknown,   ///< one of the frames doesn't show it (dark, white, behind beads), or it isn't touched in the second
 };
 
+/// "erythema", "purpura" or "unknown".
+const char* name_of(SkinMarkKind kind);
+
 /// One mark, with the figures that it is judged by.
 struct SkinMark {
   SkinMarkKind kind = SkinMarkKind::unknown;

@@ -7,29 +7,15 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/cie_colour.h"
+#include "tests/sensors/skin/painted_card.h"
 #include "tests/support/message_of.h"
 
 namespace touchstone::sensors {
 namespace {
 
+using fixtures::seen;
 using ::testing::HasSubstr;
 using touchstone::test::message_of;
-
-/// A picture under light that falls to the rim and is warm: `albedo` (R, G, B) everywhere but for a bead.
-cv::Mat seen(const Eigen::Vector3d& albedo) {
-  cv::Mat picture(120, 160, CV_8UC3);
-  for (int row = 0; row < picture.rows; ++row) {
-    for (int column = 0; column < picture.cols; ++column) {
-      const double light = 220.0 - 0.6 * std::hypot(column - 80, row - 60);
-      const Eigen::Vector3d lamp(1.0, 0.9, 0.7);
-      for (int k = 0; k < 3; ++k) {
-        picture.at<cv::Vec3b>(row, column)[2 - k] = cv::saturate_cast<std::uint8_t>(light * lamp[k] * albedo[k]);
-      }
-    }
-  }
-  cv::circle(picture, {80, 60}, 6, cv::Scalar::all(5), cv::FILLED);
-  return picture;
-}
 
 cv::Mat disc(const cv::Point& centre, int radius) {
   cv::Mat mask(120, 160, CV_8UC1, cv::Scalar(0));
