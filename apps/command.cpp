@@ -25,11 +25,14 @@ void add_calibrate_command(CLI::App& app, const GlobalOptions& global, Action& a
   command->require_subcommand(1);
   add_9dtact_calibration(*command, global, action);
   add_chroma_calibration(*command, global, action);
+  add_colour_calibration(*command, global, action);
   add_event_force_calibration(*command, global, action);
   add_event_material_calibration(*command, global, action);
   add_gelsight_calibration(*command, global, action);
   add_markers_calibration(*command, global, action);
   add_place_calibration(*command, global, action);
+  add_reflex_calibration(*command, global, action);
+  add_softness_calibration(*command, global, action);
   add_texture_calibration(*command, global, action);
   add_vhs_calibration(*command, global, action);
 }
@@ -41,11 +44,15 @@ void add_estimate_command(CLI::App& app, const GlobalOptions& global, Action& ac
   command->require_subcommand(1);
   add_9dtact_estimation(*command, global, action);
   add_chroma_estimation(*command, global, action);
+  add_colour_estimation(*command, global, action);
   add_event_force_estimation(*command, global, action);
   add_event_material_estimation(*command, global, action);
   add_gelsight_estimation(*command, global, action);
   add_markers_estimation(*command, global, action);
+  add_marks_estimation(*command, global, action);
   add_place_estimation(*command, global, action);
+  add_reflex_estimation(*command, global, action);
+  add_softness_estimation(*command, global, action);
   add_texture_estimation(*command, global, action);
   add_vhs_estimation(*command, global, action);
 }

@@ -49,8 +49,11 @@ void print_finished(const std::filesystem::path& out, std::int64_t samples);
 // What calibrate and estimate do differs from sensor to sensor: each sensor's form is a command below them.
 void add_9dtact_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
 void add_chroma_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
+void add_colour_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
 void add_markers_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
 void add_place_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
+void add_reflex_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
+void add_softness_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
 void add_texture_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
 void add_vhs_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
 void add_event_force_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
@@ -58,8 +61,12 @@ void add_event_material_calibration(CLI::App& calibrations, const GlobalOptions&
 void add_gelsight_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
 void add_9dtact_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
 void add_chroma_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
+void add_colour_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
 void add_markers_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
+void add_marks_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
 void add_place_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
+void add_reflex_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
+void add_softness_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
 void add_texture_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
 void add_vhs_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
 void add_event_force_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);

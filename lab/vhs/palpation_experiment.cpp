@@ -57,11 +57,7 @@ PalpationRecording record(const PalpationSpec& spec, const PalpationTable& table
 }  // namespace
 
 SoftnessSettings SoftnessSettings::chosen() {
-  SoftnessSettings settings;
-  settings.spectrogram.trigger_N = 0.1;
-  settings.classifier.hidden_layers = 1;
-  settings.classifier.units = 10;
-  return settings;
+  return {sensors::usual_softness_training()};
 }
 
 PalpationRecording record_reference(const PalpationSpec& spec, const PalpationTable& table,
@@ -93,20 +89,12 @@ PalpationRecording downsampled(const PalpationRecording& recording, int factor) 
 
 SoftnessScore tell_softness(const PalpationSpec& spec, const PalpationRecording& recording,
                             const SoftnessSettings& settings) {
-  const Eigen::VectorXd frequencies = sensors::spectrogram_frequencies(recording.rate_Hz, settings.spectrogram);
-  std::vector<Eigen::Index> rows;
-  for (Eigen::Index k = 0; k < frequencies.size(); ++k) {
-    if (settings.highest_Hz > 0.0 && frequencies[k] > settings.highest_Hz) continue;
-    if (frequencies[k] >= settings.lowest_Hz) rows.push_back(k);
-  }
   std::vector<sensors::MaterialSample> samples(recording.waveforms.size());
   std::vector<int> training, validation, test;
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const PalpationWaveform& waveform = recording.waveforms[i];
-    const Eigen::MatrixXd picture =
-        sensors::force_spectrogram(waveform.force_N, recording.rate_Hz, settings.spectrogram);
-    const Eigen::MatrixXd kept = picture(rows, Eigen::all);
-    samples[i].features = kept.reshaped();
+    samples[i].features = sensors::softness_features(waveform.force_N, recording.rate_Hz, settings.spectrogram,
+                                                     settings.lowest_Hz, settings.highest_Hz);
     samples[i].label = static_cast<int>(spec.materials.at(static_cast<std::size_t>(waveform.material)).level);
     const bool unseen = settings.unseen_material == waveform.material;
     if (settings.unseen_material && unseen != (waveform.set == PalpationSet::test)) continue;
@@ -127,12 +115,7 @@ SoftnessScore tell_softness(const PalpationSpec& spec, const PalpationRecording&
   std::vector<int> right(spec.materials.size(), 0), all(spec.materials.size(), 0);
   for (const int i : test) {
     const sensors::MaterialSample& sample = samples[static_cast<std::size_t>(i)];
-    Eigen::VectorXd probabilities = Eigen::VectorXd::Zero(kSoftnessLevels);
-    for (const sensors::MaterialClassifier& network : networks) {
-      probabilities += sensors::classify(network, sample.features).probabilities;
-    }
-    int guess = 0;
-    probabilities.maxCoeff(&guess);
+    const int guess = sensors::classify(networks, sample.features).label;
     truth.push_back(sample.label);
     guesses.push_back(guess);
     const auto m = static_cast<std::size_t>(recording.waveforms[static_cast<std::size_t>(i)].material);

@@ -11,9 +11,8 @@
 #include "core/progress.h"
 #include "lab/vhs/palpation_press.h"
 #include "lab/vhs/palpation_sensing.h"
-#include "sensors/events/material_classifier.h"
 #include "sensors/learning/confusion_matrix.h"
-#include "sensors/skin/force_spectrogram.h"
+#include "sensors/skin/softness_model.h"
 
 namespace touchstone::lab {
 
@@ -56,18 +55,12 @@ PalpationRecording record_vhs(const PalpationSpec& spec, const PalpationTable& t
 /// Every `factor`-th sample of each waveform.
 PalpationRecording downsampled(const PalpationRecording& recording, int factor);
 
-/// Which part of the spectrogram the networks see, and how they are trained.
-struct SoftnessSettings {
-  sensors::ForceSpectrogramSettings spectrogram;
-  double highest_Hz = 0.0;  ///< rows of the picture above are left out; 0: none
-  double lowest_Hz = 0.0;   ///< rows below are left out
-  sensors::MaterialClassifierSettings classifier;
-  int networks = 5;  ///< whose probabilities are averaged
+/// What the networks see and how they are trained.
+struct SoftnessSettings : sensors::SoftnessTraining {
   /// Trained on all other materials and tested on this one; none: each material is in training, by other pieces.
   std::optional<int> unseen_material = {};
 
-  /// One hidden layer of 10 units, of 10, 20 and 40 the best on seeds 901 and 902, which no row uses. Forces above the
-  /// vhs sensor's noise begin a waveform.
+  /// sensors::usual_softness_training.
   static SoftnessSettings chosen();
 };
 
