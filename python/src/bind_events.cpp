@@ -12,10 +12,12 @@
 #include "core/error.h"
 #include "python/src/bindings.h"
 #include "python/src/estimator.h"
+#include "python/src/records.h"
 #include "sensors/events/event_file.h"
 #include "sensors/events/grasp_force_model_file.h"
 #include "sensors/events/grasp_force_reader.h"
-#include "sensors/events/grasp_sequence.h"
+#include "sensors/events/grasp_training.h"
+#include "sensors/events/known_grasp.h"
 #include "sensors/events/material_classifier_file.h"
 
 namespace touchstone::python {
@@ -27,28 +29,14 @@ using sensors::WindowForce;
 
 constexpr std::int64_t kNotBegun = std::numeric_limits<std::int64_t>::min();
 
-/// One field of records. @throws Error naming it
-template <typename T>
-py::array_t<T> field_of(const py::array& records, const char* field) {
-  constexpr int kExact = py::array::c_style | py::array::forcecast;
-  const py::array column = py::array::ensure(records[py::str(field)]);
-  const char kind = column.dtype().kind();
-  if (kind != 'i' && kind != 'u' && kind != 'b') fail("events: the field '{}' must be whole numbers", field);
-  return py::array_t<T, kExact>(column);
-}
-
 /// Records as Touch.events has them. @throws Error
 std::vector<Event> events_from(const py::handle& value) {
-  const auto records = py::array::ensure(value);
-  constexpr const char* kWanted =
-      "events: records with the fields t_us, x, y and on are needed, as Touch.events has them";
-  if (!records || records.ndim() != 1 || records.dtype().attr("names").is_none()) fail("{}", kWanted);
-  for (const char* name : {"t_us", "x", "y", "on"}) {
-    if (!records.dtype().attr("names").contains(py::str(name))) fail("{}", kWanted);
-  }
-  const auto t_us = field_of<std::int64_t>(records, "t_us");
-  const auto x = field_of<std::int64_t>(records, "x"), y = field_of<std::int64_t>(records, "y");
-  const auto on = field_of<bool>(records, "on");
+  const py::array records =
+      records_from(value, {"t_us", "x", "y", "on"},
+                   "events: records with the fields t_us, x, y and on are needed, as Touch.events has them");
+  const auto t_us = field_of<std::int64_t>(records, "events", "t_us");
+  const auto x = field_of<std::int64_t>(records, "events", "x"), y = field_of<std::int64_t>(records, "events", "y");
+  const auto on = field_of<bool>(records, "events", "on");
   std::vector<Event> events(static_cast<std::size_t>(records.size()));
   constexpr std::int64_t kMost = std::numeric_limits<std::uint16_t>::max();
   for (py::ssize_t k = 0; k < records.size(); ++k) {
@@ -66,6 +54,113 @@ cv::Size size_from(const py::handle& value) {
   if (both.size() != 2) fail("size: (width, height) is needed");
   constexpr int kMost = 8192;
   return {whole_number_from<int>(both[0], "size", 1, kMost), whole_number_from<int>(both[1], "size", 1, kMost)};
+}
+
+/// The grasp in all events of a recording. @param readings null: forces aren't known. @throws Error
+sensors::KnownGrasp grasp_of(const std::vector<Event>& events, const cv::Size& size,
+                             const sensors::ForceReadings* readings) {
+  if (events.empty()) fail("events: there are none");
+  return unlocked([&] {
+    const sensors::EventWindowSettings settings{.start_us = events.front().t_us, .size = size};
+    sensors::EventWindows windows(settings);
+    windows.add(events);
+    return sensors::known_grasp(windows.finished(), settings, readings, "readings");
+  });
+}
+
+/// What a force sensor said: (t_us, force_N), each an array. @throws Error
+sensors::ForceReadings readings_from(const py::handle& value) {
+  const py::sequence both = sequence_from(value, "readings");
+  if (both.size() != 2) fail("readings: of each grasp (t_us, force_N) is needed");
+  sensors::ForceReadings readings;
+  readings.force_N = row_from(both[1], "readings: force_N");
+  const auto times = py::array::ensure(both[0]);
+  if (!times || times.ndim() != 1 || (times.dtype().kind() != 'i' && times.dtype().kind() != 'u')) {
+    PyErr_Clear();
+    fail("readings: t_us must be an array of whole numbers");
+  }
+  if (times.size() != std::ssize(readings.force_N)) {
+    fail("readings: {} times are given with {} forces", times.size(), readings.force_N.size());
+  }
+  const py::array_t<std::int64_t, py::array::c_style | py::array::forcecast> t_us(times);
+  readings.t_us.assign(t_us.data(), t_us.data() + t_us.size());
+  if (const std::string fault = fault_of(readings); !fault.empty()) fail("readings: {}", fault);
+  return readings;
+}
+
+/// Calls `add(events, number)` for each grasp. @throws Error naming a grasp's number
+template <typename Add>
+std::size_t for_each_grasp(const py::object& grasps, const Add& add) {
+  std::size_t number = 0;
+  for_each_item(grasps, "grasps", [&](const py::object& one) {
+    try {
+      add(events_from(one), number);
+    } catch (const Error& error) {
+      fail("grasps: number {}: {}", number, error.what());
+    }
+    ++number;
+  });
+  return number;
+}
+
+std::vector<py::object> list_from(const py::object& value, const char* what) {
+  std::vector<py::object> list;
+  for_each_item(value, what, [&](const py::object& one) { list.push_back(one); });
+  return list;
+}
+
+py::tuple train_force(const py::object& grasps, const py::object& readings, const py::object& size,
+                      const py::object& method_name, const py::object& left_out, const py::object& hidden_layers,
+                      const py::object& units, const py::object& threads) {
+  const std::string method = text_from(method_name, "method");
+  if (method != "process" && method != "network") {
+    fail("method: '{}' is not known; allowed is one of: process, network", method);
+  }
+  sensors::GraspForceTraining training;
+  if (method == "network") training.method = sensors::GraspForceMethod::network;
+  training.left_out = whole_number_from<int>(left_out, "left_out", 0, 1000);
+  training.network.hidden_layers = whole_number_from<int>(hidden_layers, "hidden_layers", 1, 8);
+  training.network.units = whole_number_from<int>(units, "units", 1, 200);
+  training.threads = whole_number_from<int>(threads, "threads", 0, 4096);
+  const cv::Size camera = size_from(size);
+  const std::vector<py::object> forces = list_from(readings, "readings");
+  std::vector<sensors::KnownGrasp> known;
+  const std::size_t count = for_each_grasp(grasps, [&](const std::vector<Event>& events, std::size_t number) {
+    if (number >= forces.size()) fail("readings: {} are given, there are more grasps", forces.size());
+    const sensors::ForceReadings of_grasp = readings_from(forces[number]);
+    known.push_back(grasp_of(events, camera, &of_grasp));
+  });
+  if (count != forces.size()) fail("readings: {} are given, there are {} grasps", forces.size(), count);
+  const sensors::GraspForceCalibration made = unlocked([&] { return sensors::calibrate_grasp_force(known, training); });
+  py::dict report;
+  report["windows"] = made.windows;
+  report["left_out"] = made.left_out;
+  report["left_out_error_N"] = made.model.error ? py::object(py::float_(made.model.error->left_out_N)) : py::none();
+  report["within_two"] = made.within_two;
+  return py::make_tuple(std::make_shared<GraspForceModel>(made.model), report);
+}
+
+py::tuple train_material(const py::object& grasps, const py::object& materials, const py::object& size,
+                         const py::object& units, const py::object& threads) {
+  sensors::MaterialClassifierSettings settings;
+  settings.units = whole_number_from<int>(units, "units", 1, 200);
+  const int at_once = whole_number_from<int>(threads, "threads", 0, 4096);
+  const cv::Size camera = size_from(size);
+  std::vector<std::string> names;
+  for_each_item(materials, "materials", [&](const py::object& one) { names.push_back(text_from(one, "materials")); });
+  std::vector<sensors::KnownGrasp> known;
+  const std::size_t count = for_each_grasp(grasps, [&](const std::vector<Event>& events, std::size_t number) {
+    if (number >= names.size()) fail("materials: {} are given, there are more grasps", names.size());
+    if (names[number].empty()) fail("materials: number {} is empty", number);
+    known.push_back(grasp_of(events, camera, nullptr));
+    known.back().material = names[number];
+  });
+  if (count != names.size()) fail("materials: {} are given, there are {} grasps", names.size(), count);
+  const sensors::GraspMaterialCalibration made =
+      unlocked([&] { return sensors::calibrate_grasp_material(known, settings, at_once); });
+  py::dict report;
+  report["left_out_right"] = made.left_out.accuracy();
+  return py::make_tuple(std::make_shared<MaterialClassifier>(made.model), report);
 }
 
 /// A reader of one grasp, which begins with the first event that it's given.
@@ -108,7 +203,7 @@ py::array column(const std::vector<WindowForce>& windows, const Value& value) {
 
 void bind_force(py::module_& module) {
   py::class_<GraspForceModel, std::shared_ptr<GraspForceModel>>(
-      module, "EventForceModel", "What `touchstone calibrate event-force` has learnt of grasps.")
+      module, "EventForceModel", "What `touchstone calibrate event-force` or train_event_force has learnt of grasps.")
       .def_static(
           "load",
           [](const py::object& path) {
@@ -116,6 +211,10 @@ void bind_force(py::module_& module) {
             return unlocked([&] { return std::make_shared<GraspForceModel>(sensors::load_grasp_force_model(file)); });
           },
           py::arg("path"), "Reads a model file.")
+      .def(
+          "save",
+          [](const GraspForceModel& self, const py::object& path) { sensors::save(self, needed_path(path, "path")); },
+          py::arg("path"), "Writes it, whole or not at all.")
       .def_property_readonly(
           "method",
           [](const GraspForceModel& self) {
@@ -192,13 +291,20 @@ void bind_force(py::module_& module) {
 
 void bind_material(py::module_& module) {
   py::class_<MaterialClassifier, std::shared_ptr<MaterialClassifier>>(
-      module, "EventMaterialModel", "What `touchstone calibrate event-material` has learnt of grasps.")
+      module, "EventMaterialModel",
+      "What `touchstone calibrate event-material` or train_event_material has learnt of grasps.")
       .def_static(
           "load",
           [](const py::object& path) {
             return std::make_shared<MaterialClassifier>(sensors::load_material_classifier(needed_path(path, "path")));
           },
           py::arg("path"), "Reads a model file.")
+      .def(
+          "save",
+          [](const MaterialClassifier& self, const py::object& path) {
+            sensors::save(self, needed_path(path, "path"));
+          },
+          py::arg("path"), "Writes it, whole or not at all.")
       .def_property_readonly(
           "materials",
           [](const MaterialClassifier& self) {
@@ -211,15 +317,10 @@ void bind_material(py::module_& module) {
           "classify",
           [](const MaterialClassifier& self, const py::object& events, const py::object& size) {
             const std::vector<Event> list = events_from(events);
-            if (list.empty()) fail("events: there are none");
             const cv::Size camera = size_from(size);
-            const sensors::MaterialGuess guess = unlocked([&] {
-              sensors::EventWindows windows({.start_us = list.front().t_us, .size = camera});
-              windows.add(list);
-              const sensors::GraspSequence grasp =
-                  sensors::grasp_sequence(windows.finished(), sensors::find_grasp_phases(windows.finished()));
-              return sensors::classify(self, sensors::grasp_features(grasp.counts, grasp.judged));
-            });
+            const sensors::GraspSequence grasp = grasp_of(list, camera, nullptr).sequence;
+            const sensors::MaterialGuess guess =
+                sensors::classify(self, sensors::grasp_features(grasp.counts, grasp.judged));
             return small_array(guess.probabilities);
           },
           py::arg("events"), py::kw_only(), py::arg("size"),
@@ -233,6 +334,27 @@ void bind_material(py::module_& module) {
 void bind_events(py::module_& module) {
   bind_force(module);
   bind_material(module);
+  const sensors::GraspForceTraining usual;
+  module.def(
+      "train_event_force", &train_force, py::arg("grasps"), py::arg("readings"), py::kw_only(), py::arg("size"),
+      py::arg("method") = "process", py::arg("left_out") = usual.left_out,
+      py::arg("hidden_layers") = usual.network.hidden_layers, py::arg("units") = usual.network.units,
+      py::arg("threads") = 0,
+      "Learns force from an event camera's grasps: returns (EventForceModel, report), as `touchstone calibrate "
+      "event-force`.\n\n"
+      "grasps: a list, of each all events in order of time: records of t_us, x, y, on; rest, touch, hold and "
+      "release. readings: for each (t_us, force_N), what a force sensor said on the events' clock. size: of the "
+      "camera, (width, height). method: 'process' (Gaussian, of counts and time) or 'network' (the published one, "
+      "of hidden_layers with units each). left_out: so many grasps are each left out of a training of their own; "
+      "their errors are those that are stated later. threads: 0: as many as the machine has.");
+  module.def(
+      "train_event_material", &train_material, py::arg("grasps"), py::arg("materials"), py::kw_only(), py::arg("size"),
+      py::arg("units") = sensors::MaterialClassifierSettings{}.units, py::arg("threads") = 0,
+      "Learns materials from an event camera's grasps: returns (EventMaterialModel, report), as `touchstone "
+      "calibrate event-material`.\n\n"
+      "grasps and size: as of train_event_force. materials: the name of each; three grasps or more of one. units: of "
+      "the network, in each of its two hidden layers. The report's left_out_right is the share named right of "
+      "grasps that were left out in turn.");
   module.def(
       "read_events",
       [](const py::object& path, const py::object& size) {

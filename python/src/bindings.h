@@ -23,6 +23,8 @@ void bind_markers(py::module_& module);
 void bind_touch(py::module_& module);
 void bind_surface(py::module_& module);
 void bind_events(py::module_& module);
+void bind_reflex(py::module_& module);
+void bind_skin(py::module_& module);
 void bind_chroma(py::module_& module);
 
 }  // namespace touchstone::python

@@ -218,6 +218,12 @@ std::vector<double> numbers_from(const py::handle& value, py::ssize_t columns, c
   return {array.data(), array.data() + array.size()};
 }
 
+std::vector<double> row_from(const py::handle& value, const char* what) {
+  const auto array = doubles_from(value, what);
+  if (array.ndim() != 1) fail("{}: an array of shape (n,) is needed, this has {}", what, shape_text(array));
+  return {array.data(), array.data() + array.size()};
+}
+
 Eigen::Vector2d vector2_from(const py::handle& value, const char* what) {
   return vector_from<2>(value, what);
 }

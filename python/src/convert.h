@@ -87,6 +87,8 @@ py::object events_array(const std::vector<Event>& events);
 
 /// Numbers in row-major order, `columns` of them a row. @throws Error naming `what` and its shape
 std::vector<double> numbers_from(const py::handle& value, py::ssize_t columns, const char* what);
+/// Numbers in one row, as many as there are. @throws Error naming `what` and its shape
+std::vector<double> row_from(const py::handle& value, const char* what);
 Eigen::Vector2d vector2_from(const py::handle& value, const char* what);
 Eigen::Vector3d vector3_from(const py::handle& value, const char* what);
 std::vector<Eigen::Vector2d> points2_from(const py::handle& value, const char* what);

@@ -24,5 +24,7 @@ PYBIND11_MODULE(_core, module) {
   python::bind_touch(module);
   python::bind_surface(module);
   python::bind_events(module);
+  python::bind_reflex(module);
+  python::bind_skin(module);
   python::bind_chroma(module);
 }

@@ -322,6 +322,60 @@ def markers_picture(shift=(0.0, 0.0), side=16.0, spacing=40.0, grid=4):
     return np.round(white).astype(np.uint8)
 
 
+def chip_picture(shift=(0.0, 0.0), growth=1.0):
+    """Dots as a motion chip sees them."""
+    rows, columns = np.mgrid[:18, :18] - 8.5
+    picture = np.full((18, 18), 6.0)
+    for x, y in [(4.3 * i + 0.5 * (j % 2), 4.3 * j - 0.3 * (i % 2)) for i in range(-3, 4) for j in range(-3, 4)]:
+        away = np.hypot(columns - growth * x - shift[0], rows - growth * y - shift[1])
+        picture = np.maximum(picture, 6 + 30 * np.clip(growth * 1.1 + 0.5 - away, 0, 1))
+    return np.round(picture).astype(np.uint8)
+
+
+def skin_picture(colour):
+    return np.broadcast_to(np.array(colour, np.uint8), (60, 80, 3)).copy()
+
+
+def statistics(valid):
+    """In place of a chip's statistics."""
+    values = [np.zeros(1, [(name, "i4") for name in valid])[0], np.zeros(3), [], [1, 2], valid["dx"], *STRANGE]
+    for name in valid:
+        values.append({key: value for key, value in valid.items() if key != name})
+        values += [{**valid, name: value} for value in numbers(0)]
+    return values
+
+
+def chip_records(valid):
+    """In place of one recording, and in place of one of several."""
+    one = valid[0]
+    changed = [one[:0], one[:1], one[None], one.tolist(), one["dx"], 0, NAN, *STRANGE]
+    for name in one.dtype.names:
+        changed.append(one[[other for other in one.dtype.names if other != name]])
+        for kind in ("i8", "f8", "U5", "O", "u1"):
+            changed.append(one.astype([(other, kind if other == name else one.dtype[other]) for other in one.dtype.names]))
+        for number in (-2**31, 2**31 - 1, 255, 0):
+            other = one.copy()
+            other[name][50:] = number
+            changed.append(other)
+    return [[], valid[:1], valid * 3, valid[0], 0, *STRANGE, *([valid[0], other] for other in changed)]
+
+
+def regions(valid):
+    return [(0, 0, 0, 0), (-1, 0, 5, 5), (79, 59, 1, 1), (80, 0, 1, 1), (0, 0, 2**31 - 1, 1), (2**40, 0, 1, 1), (1.5, 0, 5, 5),
+            (1, 2, 3), np.ones((60, 80), bool), np.zeros((60, 80), bool), np.ones((60, 80), float), np.ones((60, 80), int),
+            np.ones((59, 80), bool), np.ones((60, 80, 1), bool), np.broadcast_to(True, (2**31, 2**20)),
+            np.broadcast_to(np.int64(1), 2**40), "abcd", 7, NAN, *STRANGE]
+
+
+def patch_lists(valid):
+    frame, region, lab = valid[0]
+    changed = [(frame, region), (frame, region, lab, 1), 0, *STRANGE]
+    changed += [(frame, one, lab) for one in regions(region)]
+    changed += [(one, region, lab) for one in pictures(frame)]
+    changed += [(frame, region, one) for one in arrays(lab)]
+    return [[], valid[:2], valid * 2, valid[0], 0, *STRANGE, *([one, *valid[1:]] for one in changed)]
+
+
 def darkness_pictures():
     """As test_estimators.py has them: at rest, and with a ball of radius 2 mm pressed 0.8 mm deep, 0.05 mm a pixel."""
     rows, columns = 0.05 * (np.mgrid[:90, :120] + 0.5)
@@ -470,6 +524,89 @@ class Things:
 
     def make_event_force(self):
         return ts.EventForceModel.load(self.event_force_file)
+
+    def make_registers(self):
+        """Recordings, and the force of each frame."""
+        fields = [("dx", "i4"), ("dy", "i4"), ("squal", "i4"), ("maximum", "i4"), ("minimum", "i4"), ("average", "f8")]
+        recordings, forces = [], []
+        for axis in (0, 1):
+            normal = np.maximum(0, 3 * np.sin(np.arange(120) / 20))
+            records = np.zeros(120, fields)
+            records["squal"], records["minimum"] = 90, 6
+            records["maximum"], records["average"] = np.round(36 + 2 * normal), 15 + 1.5 * normal
+            records["dx" if axis == 0 else "dy"][normal > 0] = 1
+            shear = np.zeros((120, 2))
+            shear[:, axis] = 0.01 * np.cumsum(normal > 0)
+            recordings.append(records)
+            forces.append(np.column_stack([shear, normal]))
+        return recordings, forces
+
+    def make_reflex(self):
+        return ts.calibrate_reflex(*self.registers)[0]
+
+    def make_reflex_file(self):
+        self.reflex.save("reflex.model")
+        return "reflex.model"
+
+    def make_dot_readings(self):
+        tracker = ts.ExploreTracker(chip_picture())
+        return [tracker.track(chip_picture(shift, growth)) for growth in (1.0, 1.05, 1.1, 1.15)
+                for shift in ((0, 0), (0.5, 0), (0, 0.5), (0.5, 0.5))]
+
+    def make_known_dots(self):
+        """Presses, forces, lateral displacements, series."""
+        press = [1.0 * (k // 4) for k in range(16)]
+        lateral = np.array([(0.25 * (k % 2), 0.25 * (k // 2 % 2)) for k in range(16)])
+        return press, np.column_stack([0.5 * lateral, np.expm1(0.5 * np.array(press))]), lateral, [k % 2 for k in range(16)]
+
+    def make_explore(self):
+        press, forces, lateral, _ = self.known_dots
+        return ts.calibrate_explore(self.dot_readings, press, forces, lateral_mm=lateral, terms=1)[0]
+
+    def make_explore_file(self):
+        self.explore.save("explore.model")
+        return "explore.model"
+
+    def make_colour_patches(self):
+        return [(skin_picture(colour), (10, 10, 20, 20), lab)
+                for colour, lab in (((40, 60, 180), (45, 50, 30)), ((50, 160, 60), (60, -40, 35)), ((190, 60, 40), (35, 20, -50)),
+                                    ((90, 90, 90), (55, 0, 0)))]
+
+    def make_colour(self):
+        return ts.calibrate_colour([skin_picture((200, 210, 220))], self.colour_patches)[0]
+
+    def make_colour_file(self):
+        self.colour.save("colour.model")
+        return "colour.model"
+
+    def make_grasps(self):
+        """Events of grasps, readings of forces, materials: rest, touch, hold, release."""
+        grasps, readings, materials = [], [], []
+        for k in range(6):
+            counts = np.full(160, 3)
+            counts[30:52] += 40 + 5 * k
+            counts[110:132] += 30 + 10 * (k % 2)
+            t_us = np.concatenate([7000 * w + np.linspace(0, 6990, n).astype(int) for w, n in enumerate(counts)])
+            events = np.zeros(len(t_us), [("t_us", "i8"), ("x", "u2"), ("y", "u2"), ("on", "?")])
+            events["t_us"], events["on"] = t_us, np.arange(len(t_us)) % 2
+            grasps.append(events)
+            times = np.arange(0, 160 * 7000, 7000)
+            readings.append((times, np.clip((times / 7000 - 30) / 22, 0, 1) * (0.5 + 0.2 * k)))
+            materials.append("wood" if k % 2 else "foam")
+        return grasps, readings, materials
+
+    def make_presses(self):
+        """Forces over time, and levels."""
+        t_s = np.arange(300) / 250
+        press = [np.maximum(0, 2 * (1 - np.exp(-(t_s - 0.2) / (0.3 / (1 + k % 2))))) + 0.001 * k for k in range(6)]
+        return press, ["hard" if k % 2 else "soft" for k in range(6)]
+
+    def make_softness(self):
+        return ts.calibrate_softness(*self.presses, 250.0, trigger_N=0.2, networks=1)[0]
+
+    def make_softness_file(self):
+        self.softness.save("softness.model")
+        return "softness.model"
 
     def make_reader(self):
         return ts.ColourMarkerReader(markers_picture(), grid=(4, 4))
@@ -710,6 +847,68 @@ def table(t):
                                                  {"path": (t.event_material_file, paths)})],
         "EventMaterialModel.classify": lambda: [Call(lambda: ts.EventMaterialModel.load(t.event_material_file).classify, {
             "events": (t.events, records), "size": ((240, 180), sizes)}, refused=True)],
+        "ReflexModel.load": lambda: [Call(lambda: ts.ReflexModel.load, {"path": (t.reflex_file, paths)})],
+        "ReflexModel.save": lambda: [Call(lambda: t.reflex.save, {"path": ("y", paths)})],
+        "ReflexReader": lambda: [Call(lambda: ts.ReflexReader, {
+            "model": (t.reflex, only(*STRANGE)), "stop_above_N": (0.0, numbers), "stop_frames": (1, numbers),
+            "release_frames": (15, numbers), "stop_when_blind": (True, flags), "blind_frames": (3, numbers)})],
+        "ReflexReader.read": lambda: [Call(lambda: ts.ReflexReader(t.reflex).read, {
+            "statistics": ({"dx": 1, "dy": 0, "squal": 90, "maximum": 36, "minimum": 6, "average": 15.0}, statistics)})],
+        "ReflexReader.restart": lambda: [Call(lambda: ts.ReflexReader(t.reflex).restart)],
+        "calibrate_reflex": lambda: [Call(lambda: ts.calibrate_reflex, {
+            "recordings": (t.registers[0], chip_records), "forces_N": (t.registers[1], lists_of(arrays)),
+            "contact_N": (0.02, numbers), "degree": (1, numbers)})],
+        "ExploreTracker": lambda: [Call(lambda: ts.ExploreTracker, {
+            "rest": (chip_picture(), pictures), "white": (63.0, numbers), "pixel_rate_Hz": (1500.0, numbers)},
+            after=lambda tracker: tracker.track(chip_picture(), t_us=0) and None),
+            Call(lambda: ts.ExploreTracker, {"rest": ([chip_picture()] * 2, lists_of(pictures))})],
+        "ExploreTracker.track": lambda: [Call(lambda: ts.ExploreTracker(chip_picture()).track, {
+            "frame": (chip_picture((0.5, 0)), pictures), "t_us": (1000, numbers)})],
+        "ExploreTracker.restart": lambda: [Call(lambda: ts.ExploreTracker(chip_picture()).restart, {
+            "rest": (chip_picture(), pictures)})],
+        "ExploreModel.load": lambda: [Call(lambda: ts.ExploreModel.load, {"path": (t.explore_file, paths)})],
+        "ExploreModel.save": lambda: [Call(lambda: t.explore.save, {"path": ("y", paths)})],
+        "ExploreModel.estimate": lambda: [Call(lambda: t.explore.estimate, {
+            "reading": (t.dot_readings[5], only(*STRANGE))})],
+        "calibrate_explore": lambda: [Call(lambda: ts.calibrate_explore, {
+            "readings": (t.dot_readings, lists_of(lambda valid: STRANGE)), "press_mm": (t.known_dots[0], arrays),
+            "forces_N": (t.known_dots[1], arrays), "lateral_mm": (t.known_dots[2], arrays),
+            "series": (t.known_dots[3], lists_of(numbers)), "terms": (1, numbers)})],
+        "ColourModel.load": lambda: [Call(lambda: ts.ColourModel.load, {"path": (t.colour_file, paths)})],
+        "ColourModel.save": lambda: [Call(lambda: t.colour.save, {"path": ("y", paths)})],
+        "ColourModel.lab": lambda: [Call(lambda: t.colour.lab, {
+            "frame": (skin_picture((40, 60, 180)), pictures), "region": ((10, 10, 20, 20), regions)})],
+        "calibrate_colour": lambda: [Call(lambda: ts.calibrate_colour, {
+            "card": ([skin_picture((200, 210, 220))], lists_of(pictures)), "patches": (t.colour_patches, patch_lists),
+            "smooth_px": (4.0, numbers)})],
+        "skin_marks": lambda: [Call(lambda: ts.skin_marks, {
+            "before": (markers_picture(), pictures), "pressed": (markers_picture(), pictures),
+            **{name: (usual, numbers) for name, usual in (("smooth_px", 4), ("least_index", 3), ("least_area_px", 300), ("rim_px", 8),
+                                                           ("ring_px", 16), ("bead_px", 44), ("blanched_share", 0.5),
+                                                           ("wetted_part", 0.8))}})],
+        "force_spectrogram": lambda: [Call(lambda: ts.force_spectrogram, {
+            "force_N": (np.linspace(0, 3, 400), arrays), "rate_Hz": (500.0, numbers), "window_s": (0.064, numbers),
+            "hop_s": (0.032, numbers), "length_s": (0.768, numbers), "trigger_N": (0.05, numbers), "before_s": (0.032, numbers),
+            "floor_N": (1e-3, numbers)})],
+        "SoftnessModel.load": lambda: [Call(lambda: ts.SoftnessModel.load, {"path": (t.softness_file, paths)})],
+        "SoftnessModel.save": lambda: [Call(lambda: t.softness.save, {"path": ("y", paths)})],
+        "SoftnessModel.classify": lambda: [Call(lambda: t.softness.classify, {"force_N": (t.presses[0][0], arrays)})],
+        "calibrate_softness": lambda: [Call(lambda: ts.calibrate_softness, {
+            "presses": (t.presses[0], lists_of(arrays)), "levels": (t.presses[1], lists_of(texts)),
+            "rate_Hz": (250.0, numbers), "trigger_N": (0.2, numbers), "highest_Hz": (0.0, numbers), "units": (3, numbers),
+            "networks": (1, numbers), "threads": (1, numbers)})],
+        "EventForceModel.save": lambda: [Call(lambda: t.event_force.save, {"path": ("y", paths)})],
+        "EventMaterialModel.save": lambda: [Call(lambda: ts.EventMaterialModel.load(t.event_material_file).save,
+                                                 {"path": ("y", paths)})],
+        "train_event_force": lambda: [Call(lambda: ts.train_event_force, {
+            "grasps": (t.grasps[0], lists_of(records)), "readings": (t.grasps[1], lists_of(lambda valid: [
+                (), (valid[0],), (valid[1], valid[0]), *((valid[0], one) for one in arrays(valid[1])),
+                *((one, valid[1]) for one in arrays(valid[0])), *STRANGE])), "size": ((240, 180), sizes),
+            "method": ("process", texts), "left_out": (0, only(-1, 1, 2**31, NAN, *STRANGE)), "hidden_layers": (1, numbers),
+            "units": (2, only(0, -1, 201, 2**31, NAN, *STRANGE)), "threads": (1, numbers)})],
+        "train_event_material": lambda: [Call(lambda: ts.train_event_material, {
+            "grasps": (t.grasps[0], lists_of(records)), "materials": (t.grasps[2], lists_of(texts)),
+            "size": ((240, 180), sizes), "units": (2, only(0, -1, 201, 2**31, NAN, *STRANGE)), "threads": (1, numbers)})],
         "read_events": lambda: [Call(lambda: ts.read_events, {"path": (t.events_file, paths), "size": ((240, 180), sizes)})],
         "StiffnessForceModel.load": lambda: [Call(lambda: ts.StiffnessForceModel.load,
                                                   {"path": (t.stiffness_file, paths)})],

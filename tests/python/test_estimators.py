@@ -272,14 +272,14 @@ def test_touches_are_placed_on_a_map(tmp_path):
             tactile_map.localise(strewn(), **{"mm_per_px": 0.05, **bad})
 
 
-def grasp_events(number, start_us=10**9):
+def grasp_events(number, start_us=10**9, power=0.5):
     """Events of a grasp by a formula, and its force in windows of 7 ms: rest, a rise in 22 windows, hold, release."""
     rng = np.random.default_rng(number)
     window = np.arange(180)
     peak, speed = rng.uniform(1.5, 3.5), rng.uniform(0.8, 1.2)
     force = np.where(window < 30, 0, peak * (1 - np.exp(-3 * speed * (window - 29) / 22)))
     force = np.where(window >= 152, peak * np.exp(-0.5 * np.clip(window - 151, 0, None)), force)
-    change = 4000 * np.diff(np.sqrt(np.maximum(force, 0) / 3.5), prepend=0)
+    change = 4000 * np.diff((np.maximum(force, 0) / 3.5)**power, prepend=0)
     off, on = rng.poisson(20 + np.maximum(change, 0)), rng.poisson(20 + np.maximum(-1.5 * change, 0))
     t_us = [np.sort(rng.integers(7000 * k, 7000 * (k + 1), off[k] + on[k])) for k in window]
     t_us[0][0] = 0
@@ -309,6 +309,13 @@ def test_forces_of_events_are_read_as_they_come(tmp_path):
                     str(tmp_path / "grasps.csv"), "--size", "32x24", "--left-out", "4", "-o", path], check=True)
     model = ts.EventForceModel.load(path)
     assert model.method == "process" and 0 < model.left_out_error_N < 0.5
+    # Python learns the same, to the bit.
+    tables = [np.loadtxt(tmp_path / f"{k}.csv", delimiter=",", skiprows=1) for k in range(8)]
+    learnt, report = ts.train_event_force([grasp_events(k)[0] for k in range(8)],
+                                          [(table[:, 0].astype(int), table[:, 1]) for table in tables], size=(32, 24), left_out=4)
+    learnt.save(tmp_path / "again.json")
+    assert (tmp_path / "again.json").read_bytes() == (tmp_path / "force.json").read_bytes()
+    assert report["left_out"] == 4 and report["left_out_error_N"] == model.left_out_error_N and report["windows"] > 300
     events, force = grasp_events(100)
     reader = ts.EventForceReader(model, size=(32, 24))
     for part in np.array_split(events, 50):
@@ -332,6 +339,31 @@ def test_forces_of_events_are_read_as_they_come(tmp_path):
         ts.EventForceReader(model, size=(0, 4))
     read = ts.read_events(str(tmp_path / "3.txt"), size=(32, 24))
     assert np.array_equal(read, grasp_events(3)[0])
+
+
+def test_materials_of_events_are_learnt_and_named(tmp_path):
+    powers = {"foam": 0.4, "steel": 0.85}
+    names = [name for _ in range(12) for name in powers]
+    grasps = [grasp_events(k, power=powers[name])[0] for k, name in enumerate(names)]
+    model, report = ts.train_event_material(grasps, names, size=(32, 24))
+    assert model.materials == ["foam", "steel"] and report["left_out_right"] > 0.8
+    model.save(tmp_path / "material.json")
+    model = ts.EventMaterialModel.load(tmp_path / "material.json")
+    right = 0
+    for k in range(100, 110):
+        for label, power in enumerate(powers.values()):
+            guess = model.classify(grasp_events(k, power=power)[0], size=(32, 24))
+            assert guess.sum() == pytest.approx(1)
+            right += guess.argmax() == label
+    assert right >= 17  # of 20
+    with pytest.raises(ts.Error, match="materials: 23 are given, there are more grasps"):
+        ts.train_event_material(grasps, names[:-1], size=(32, 24))
+    with pytest.raises(ts.Error, match="grasps: number 1: .*touch"):
+        ts.train_event_material([grasps[0], grasps[1][:3000]], names[:2], size=(32, 24))
+    with pytest.raises(ts.Error, match="readings: t_us must be an array of whole numbers"):
+        ts.train_event_force(grasps[:3], [((0.5, 1.5), (0, 1))] * 3, size=(32, 24))
+    with pytest.raises(ts.Error, match="readings: ends at 2000000000 us|readings: "):
+        ts.train_event_force(grasps[:3], [(np.array([0, 5]), (0, 1))] * 3, size=(32, 24))
 
 
 def markers_picture(shift=(0.0, 0.0), side=16.0, spacing=40.0, grid=4):
