@@ -27,6 +27,8 @@
 #include "sensors/markers/gel_force_model.h"
 #include "sensors/reflex/explore_model.h"
 #include "sensors/reflex/reflex_model.h"
+#include "sensors/skin/colour_model.h"
+#include "sensors/skin/softness_model.h"
 #include "sensors/texture/texture_model_file.h"
 #include "sensors/touch_map/tactile_map_file.h"
 #include "sensors/tractions/marker_compliance_file.h"
@@ -192,6 +194,26 @@ TactileMapData map() {
   data.frame.mm_per_px = 0.05;
   data.touches = 1;
   return data;
+}
+
+ColourModel colour() {
+  ColourModel model;
+  model.field.white = cv::Mat(3, 4, CV_32FC3, cv::Scalar(100, 110, 120));
+  model.field.trusted = cv::Mat(3, 4, CV_8UC1, cv::Scalar(255));
+  model.field.trusted.at<std::uint8_t>(1, 1) = 0;
+  model.matrix.xyz_from_rgb << 0.5, 0.25, 0.125, 0.25, 0.625, 0.125, 0.0, 0.125, 0.9375;
+  model.patches = 4;
+  model.mean_error_de2000 = 0.5;
+  model.largest_error_de2000 = 1.0;
+  return model;
+}
+
+SoftnessModel softness() {
+  SoftnessModel model;
+  model.rate_Hz = 250.0;
+  model.highest_Hz = 60.0;
+  model.networks = {classifier(), classifier()};
+  return model;
 }
 
 TextureModel texture() {
@@ -378,6 +400,8 @@ void write_seeds(const std::filesystem::path& corpus) {
   save(height(), models / "height.gel");
   save(compliance(), models / "marker_compliance.bin");
   save(map(), models / "tactile.map");
+  save(colour(), models / "colour.colour");
+  save(softness(), models / "softness.json");
   save(texture(), models / "texture.bin");
   for (const char* name :
        {"events/space.txt", "events/comma.csv", "events/evt3.raw", "events/lz4.aedat4", "event_hdf5/dsec.h5"}) {

@@ -18,6 +18,8 @@
 #include "sensors/markers/gel_force_model.h"
 #include "sensors/reflex/explore_model.h"
 #include "sensors/reflex/reflex_model.h"
+#include "sensors/skin/colour_model.h"
+#include "sensors/skin/softness_model.h"
 #include "sensors/texture/texture_model_file.h"
 #include "sensors/touch_map/tactile_map_file.h"
 #include "sensors/tractions/marker_compliance_file.h"
@@ -46,7 +48,7 @@ struct Format {
   bool (*comes_back)(const std::string& bytes);
 };
 
-const std::array<Format, 14> kFormats{
+const std::array<Format, 16> kFormats{
     {{"touchstone.explore_model", [](auto& b) { return comes_back(b, explore_model_from_json, to_text); }},
      {"touchstone.gaussian_process", [](auto& b) { return comes_back(b, gaussian_process_from_json, to_text); }},
      {"touchstone.gel_force_model", [](auto& b) { return comes_back(b, gel_force_model_from_json, to_text); }},
@@ -54,8 +56,10 @@ const std::array<Format, 14> kFormats{
      {"touchstone.hue_model", [](auto& b) { return comes_back(b, hue_model_from_json, to_text); }},
      {"touchstone.material_classifier", [](auto& b) { return comes_back(b, material_classifier_from_json, to_text); }},
      {"touchstone.reflex_model", [](auto& b) { return comes_back(b, reflex_model_from_json, to_text); }},
+     {"touchstone.softness_model", [](auto& b) { return comes_back(b, softness_model_from_json, to_text); }},
      {"touchstone.stiffness_force_model", [](auto& b) { return comes_back(b, stiffness_model_from_json, to_text); }},
      {"touchstone.time_delay_network", [](auto& b) { return comes_back(b, time_delay_network_from_json, to_text); }},
+     {"touchstone.colour_model", [](auto& b) { return comes_back(b, colour_model_from_bytes, to_binary); }},
      {"touchstone.darkness_model", [](auto& b) { return comes_back(b, darkness_model_from_bytes, to_binary); }},
      {"touchstone.height_model", [](auto& b) { return comes_back(b, height_model_from_bytes, to_binary); }},
      {"touchstone.marker_compliance", [](auto& b) { return comes_back(b, marker_compliance_from_bytes, to_binary); }},
