@@ -67,7 +67,7 @@ def skin(left, right, brightness, seed):
 SKIN, RED, PURPLE = (60, 75, 120), (50, 52, 128), (35, 28, 66)
 
 
-def test_marks_that_fade_are_told_from_those_that_stay():
+def test_marks_that_fade_are_distinguished_from_those_that_stay():
     marks = ts.skin_marks(skin(RED, PURPLE, 1.0, 1), skin(SKIN, PURPLE, 0.7, 2))
     assert {("left" if m.centre_px[0] < 160 else "right"): m.kind for m in marks} == {"left": "erythema", "right": "purpura"}
     left = min(marks, key=lambda m: m.centre_px[0])
