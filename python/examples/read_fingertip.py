@@ -7,12 +7,16 @@ virtual fingertip gives both, so that the truth is known. A plate presses it, an
     read_fingertip.py
 """
 
+import pathlib
 import time
 
 import numpy as np
 import touchstone as ts
+import yaml
 
-sensor = ts.Sensor("reflex", deepest_mm=1.6)
+device = yaml.safe_load((pathlib.Path(ts.scenes_folder()) / "devices" / "reflex.yaml").read_text())
+device["mesh"].update(fine_mm=2, coarse_mm=4.5)  # twice as coarse: set up in seconds
+sensor = ts.Sensor(device, deepest_mm=1.6)
 plate = ts.Object({"name": "plate", "shape": {"type": "box", "size_mm": [40, 40, 4]}, "friction": 0.5})
 over_mm = sensor.touch_height_mm(plate) + 0.3
 FIELDS = ("dx", "dy", "squal", "maximum", "minimum", "average")
@@ -37,7 +41,7 @@ def registers(touches):
 # Each recording: at rest, and pressed. Its forces are what a force sensor under the plate says.
 at_rest = press(0)
 drags = [(0, 0), (0.25, 0), (0, 0.25), (-0.25, 0)]
-depths = np.linspace(0.1, 1.5, 15)
+depths = np.linspace(0.1, 1.5, 18)
 begin = time.perf_counter()
 known = [press(depth, drags[k % 4], frame=1 + k) for k, depth in enumerate(depths)]
 others = [press(depth, drag, frame=100 + k) for k, (depth, drag) in enumerate([(0.45, (0, 0)), (0.85, (0.15, 0.15)), (1.25, (0, -0.2))])]
