@@ -145,7 +145,9 @@ std::string states(const ReadTable& one, const EstimateSequence& sequence) {
   if (one.many_lines || sequence.frames.size() < 2) return "";
   plots::StatePlot plot{.title = "what was seen", .x_label = axis_label(sequence)};
   plot.begin = sequence.frames.front().at;
-  plot.end = sequence.frames.back().at;
+  // The last frame lasts as long as the others.
+  const double frames = static_cast<double>(sequence.frames.size());
+  plot.end = sequence.frames.back().at + (sequence.frames.back().at - plot.begin) / (frames - 1.0);
   const auto add_row = [&](const EstimateColumn& column, const auto& state) {
     plots::StateRow row{.name = column.name};
     bool any = false;

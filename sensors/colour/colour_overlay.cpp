@@ -16,8 +16,8 @@ constexpr double kLeastColourArrow = 0.5;  // px: a shorter one is noise
 const cv::Scalar kMeasured(60, 220, 60);
 const cv::Scalar kBeyond(0, 220, 220);
 const cv::Scalar kFlawed(40, 40, 230);
-const cv::Scalar kColourArrow(200, 60, 0);
-const cv::Scalar kColourWords(120, 0, 0);
+const cv::Scalar kColourArrow(0, 220, 255);
+const cv::Scalar kColourWords(0, 220, 255);
 
 }  // namespace
 
@@ -48,7 +48,7 @@ void draw_overlay(const cv::Mat& frame, const ColourMarkerReading& rest, const C
   if (how.force_N) {
     words = fmt::format("{:.2f} {:.2f} {:.2f} N  {}", how.force_N->x(), how.force_N->y(), how.force_N->z(), words);
   }
-  cv::putText(picture, words, {4, picture.rows - 6}, cv::FONT_HERSHEY_SIMPLEX, 0.4, kColourWords, 1, cv::LINE_AA);
+  write_below(words, kColourWords, picture);
 }
 
 }  // namespace touchstone::sensors

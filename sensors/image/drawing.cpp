@@ -20,4 +20,10 @@ void copy_in_colour(const cv::Mat& frame, cv::Mat& picture) {
   }
 }
 
+void write_below(const std::string& words, const cv::Scalar& colour, cv::Mat& picture) {
+  const cv::Point at(4, picture.rows - 6);
+  cv::putText(picture, words, at, cv::FONT_HERSHEY_SIMPLEX, 0.4, cv::Scalar(0, 0, 0), 3, cv::LINE_AA);
+  cv::putText(picture, words, at, cv::FONT_HERSHEY_SIMPLEX, 0.4, colour, 1, cv::LINE_AA);
+}
+
 }  // namespace touchstone::sensors

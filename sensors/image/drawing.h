@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
+#include <string>
 
 namespace touchstone::sensors {
 
@@ -15,5 +16,8 @@ cv::Point drawn_at(const Eigen::Vector2d& position);
 
 /// Makes `picture` a BGR copy of a frame; the two may be one. @pre the frame is CV_8UC1 or CV_8UC3
 void copy_in_colour(const cv::Mat& frame, cv::Mat& picture);
+
+/// Writes into the picture's lower left corner, with a black rim, so that it can be read on any ground. @pre CV_8UC3
+void write_below(const std::string& words, const cv::Scalar& colour, cv::Mat& picture);
 
 }  // namespace touchstone::sensors

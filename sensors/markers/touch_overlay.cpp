@@ -67,8 +67,7 @@ void draw_touch(const TouchReading& touch, cv::Mat& picture, const TouchOverlay&
   if (touch.patch) draw_patch(*touch.patch, touch.trusted ? kTrustedEllipse : kDoubtedEllipse, picture);
   if (touch.normal_N) draw_bar(*touch.normal_N, touch.normal_error_N, how.full_force_N, picture);
   const bool slips = touch.rule_slip || touch.rim.state == SlipState::kSliding;
-  cv::putText(picture, words_of(touch), {4, picture.rows - 6}, cv::FONT_HERSHEY_SIMPLEX, 0.4,
-              slips ? kSlipWords : kTouchWords, 1, cv::LINE_AA);
+  write_below(words_of(touch), slips ? kSlipWords : kTouchWords, picture);
 }
 
 }  // namespace touchstone::sensors
