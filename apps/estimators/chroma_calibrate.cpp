@@ -5,6 +5,7 @@
 
 #include "apps/command.h"
 #include "apps/estimators/chroma_grid.h"
+#include "apps/estimators/source_options.h"
 #include "core/error.h"
 #include "core/units.h"
 #include "lab/chroma/chroma_fields.h"
@@ -45,10 +46,11 @@ void print_errors(const char* what, const sensors::HueErrors& errors) {
 void calibrate(const CalibrateOptions& options) {
   require_writable_place(options.out);
   const Eigen::Vector2i grid = grid_of(options.grid);
-  const std::vector<lab::AnnotatedMarker> table = lab::read_hue_sample_table(options.frames, options.presses, grid);
+  datasets::TableFrames frames(options.frames);
+  const std::vector<lab::AnnotatedMarker> table = lab::read_hue_sample_table(frames, options.presses, grid);
   sensors::ColourMarkerFinder finder({.grid = grid});
   lab::find_rest_of(finder, options.rest);
-  const lab::TableSamples read = lab::read_hue_samples(table, finder);
+  const lab::TableSamples read = lab::read_hue_samples(frames, table, finder);
   sensors::HueCalibrationSettings settings;
   settings.spacing_mm = options.spacing_mm;
   settings.parallax.viewing_distance_mm = options.viewing_distance_mm;
@@ -81,7 +83,7 @@ void add_chroma_calibration(CLI::App& calibrations, const GlobalOptions&, Action
   CLI::App* command = calibrations.add_subcommand(
       "chroma", "Make its model from hues and places to displacements, of frames simulated or recorded");
   auto options = std::make_shared<CalibrateOptions>();
-  command->add_option("--frames", options->frames, "The folder of the pictures")->required();
+  command->add_option("--frames", options->frames, kTableFramesHelp)->required();
   command
       ->add_option("--presses", options->presses,
                    "CSV with the header file,marker_column,marker_row,x_mm,y_mm,z_mm,series: how far a marker is "

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "apps/command.h"
+#include "apps/estimators/source_options.h"
 #include "apps/progress_bar.h"
 #include "lab/vhs/colour_table.h"
 
@@ -19,11 +20,14 @@ struct CalibrateOptions {
 
 void calibrate(const CalibrateOptions& options, const GlobalOptions& global) {
   require_writable_place(options.out);
-  const std::vector<lab::KnownPatch> patches = lab::read_patch_table(options.frames, options.patches);
+  datasets::TableFrames frames(options.frames);
+  const std::vector<lab::KnownPatch> patches = lab::read_patch_table(frames, options.patches);
+  std::vector<std::filesystem::path> card;
+  for (const std::filesystem::path& name : options.card) card.push_back(frames.named_or_file(name));
   lab::ColourCalibration made;
   {
     ProgressBar bar(global.quiet);
-    made = lab::calibrate_colour(options.card, options.smooth_px, patches, bar.listener());
+    made = lab::calibrate_colour(frames, card, options.smooth_px, patches, bar.listener());
   }
   sensors::save(made.model, options.out);
   warn_of_faults(made.faults);
@@ -44,15 +48,17 @@ void add_colour_calibration(CLI::App& calibrations, const GlobalOptions& global,
   CLI::App* command = calibrations.add_subcommand(
       "colour", "Make the model of colours seen through a clear gel, of a white card and patches that are known");
   auto options = std::make_shared<CalibrateOptions>();
-  command->add_option("--frames", options->frames, "The folder of the pictures of patches")->required();
+  command->add_option("--frames", options->frames, kTableFramesHelp)->required();
   command
       ->add_option("--patches", options->patches,
                    "CSV with the header file,left_px,top_px,width_px,height_px,L,a,b (CIE L*a*b*, D65), or "
                    "red,green,blue (sRGB, 0 to 255) in place of these three: rectangles of known colour")
       ->required();
   command
-      ->add_option("--card", options->card,
-                   "Pictures of an even white card through the gel, one or more, of the same exposure")
+      ->add_option(
+          "--card", options->card,
+          "Pictures of an even white card through the gel, one or more, of the same exposure: of these frames, or "
+          "files elsewhere")
       ->required();
   command->add_option("--smoothing-px", options->smooth_px, "Standard deviation of the card's smoothing, px; 0 is none")
       ->check(CLI::Range(0.0, 100.0))

@@ -2,6 +2,7 @@
 #include <optional>
 
 #include "apps/command.h"
+#include "apps/estimators/source_options.h"
 #include "lab/dtact/dark_presses.h"
 #include "sensors/heights/darkness_calibration.h"
 #include "sensors/heights/darkness_model_file.h"
@@ -22,16 +23,6 @@ struct CalibrateOptions {
   fs::path out;
 };
 
-/// A rest picture is named like the table's pictures, relative to their folder, or by a path of its own.
-std::vector<fs::path> rest_files(const CalibrateOptions& options) {
-  std::vector<fs::path> files;
-  for (const fs::path& name : options.rest) {
-    const fs::path beside = options.frames / name;
-    files.push_back(fs::exists(beside) ? beside : name);
-  }
-  return files;
-}
-
 void print_error(const char* of, const sensors::ProfileError& error) {
   fmt::print(
       "  {}: heights over rings are off by {:.4f} mm in the mean, {:.4f} RMS, {:.4f} at most; single pixels by "
@@ -47,10 +38,11 @@ void calibrate(const CalibrateOptions& options) {
   settings.darkening.smoothing_px = options.smoothing_px;
   settings.darkening.follow_exposure = !options.locked_exposure;
   settings.cross_validate = true;
-  const std::vector<lab::AnnotatedPress> table = lab::read_ball_press_table(options.frames, options.annotations);
-  const sensors::RestPicture rest = lab::read_rest_picture(rest_files(options));
+  datasets::TableFrames frames(options.frames);
+  const std::vector<lab::AnnotatedPress> table = lab::read_ball_press_table(frames, options.annotations);
+  const sensors::RestPicture rest = lab::read_rest_picture(frames, lab::rest_files(frames, options.rest));
   const std::vector<sensors::BallPress> presses =
-      lab::read_dark_presses(table, rest, settings.darkening, settings.scale);
+      lab::read_dark_presses(frames, table, rest, settings.darkening, settings.scale);
   const sensors::DarknessCalibration result = sensors::calibrate_darkness(presses, rest, settings);
   sensors::save(result.model, options.out);
 
@@ -79,13 +71,16 @@ void add_9dtact_calibration(CLI::App& calibrations, const GlobalOptions&, Action
   CLI::App* command = calibrations.add_subcommand(
       "9dtact", "Make the curve from darkness to height of frames of a pressed ball: a milky gel under a black skin");
   auto options = std::make_shared<CalibrateOptions>();
-  command->add_option("--frames", options->frames, "The folder of the pictures")->required();
+  command->add_option("--frames", options->frames, kTableFramesHelp)->required();
   command
       ->add_option("--annotations", options->annotations,
                    "CSV with the header file,u_px,v_px,radius_px,ball_diameter_mm: the outline of the touched part of "
                    "the ball in each picture, or three empty cells where it is to be found")
       ->required();
-  command->add_option("--rest", options->rest, "Pictures of the untouched gel, one or more")->required();
+  command
+      ->add_option("--rest", options->rest,
+                   "Pictures of the untouched gel, one or more: of these frames, or files elsewhere")
+      ->required();
   command->add_option("--mm-per-px", options->mm_per_px, "Size of a pixel on the gel, mm")
       ->required()
       ->check(CLI::Range(1e-4, 10.0));

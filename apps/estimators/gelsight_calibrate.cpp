@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "apps/command.h"
+#include "apps/estimators/source_options.h"
 #include "core/error.h"
 #include "lab/gelsight/ball_press_table.h"
 #include "sensors/heights/height_calibration.h"
@@ -23,16 +24,6 @@ struct CalibrateOptions {
   std::string slopes = "best";
   fs::path out;
 };
-
-/// A background is named like the table's pictures, relative to their folder, or by a path of its own.
-std::vector<fs::path> background_files(const CalibrateOptions& options) {
-  std::vector<fs::path> files;
-  for (const fs::path& name : options.background) {
-    const fs::path beside = options.frames / name;
-    files.push_back(fs::exists(beside) ? beside : name);
-  }
-  return files;
-}
 
 sensors::LightCorrection correction_named(const std::string& name) {
   if (name == "none") return sensors::LightCorrection::none;
@@ -61,9 +52,10 @@ void print_presses(const sensors::HeightCalibration& result) {
 
 void calibrate(const CalibrateOptions& options) {
   require_writable_place(options.out);
-  const std::vector<lab::AnnotatedPress> table = lab::read_ball_press_table(options.frames, options.annotations);
-  const sensors::Background background = lab::read_background(background_files(options));
-  const std::vector<sensors::BallPress> presses = lab::read_ball_presses(table);
+  datasets::TableFrames frames(options.frames);
+  const std::vector<lab::AnnotatedPress> table = lab::read_ball_press_table(frames, options.annotations);
+  const sensors::Background background = lab::read_background(frames, lab::rest_files(frames, options.background));
+  const std::vector<sensors::BallPress> presses = lab::read_ball_presses(frames, table);
   sensors::HeightCalibrationSettings settings;
   settings.mm_per_px = options.mm_per_px;
   settings.gel_thickness_mm = options.gel_thickness_mm;
@@ -99,13 +91,16 @@ void add_gelsight_calibration(CLI::App& calibrations, const GlobalOptions&, Acti
   CLI::App* command = calibrations.add_subcommand(
       "gelsight", "Make its table from colours to slopes of frames of a pressed ball, simulated or recorded");
   auto options = std::make_shared<CalibrateOptions>();
-  command->add_option("--frames", options->frames, "The folder of the pictures")->required();
+  command->add_option("--frames", options->frames, kTableFramesHelp)->required();
   command
       ->add_option("--annotations", options->annotations,
                    "CSV with the header file,u_px,v_px,radius_px,ball_diameter_mm: the outline of the touched part of "
                    "the ball in each picture, or three empty cells where it is to be found")
       ->required();
-  command->add_option("--background", options->background, "Pictures of the untouched gel, one or more")->required();
+  command
+      ->add_option("--background", options->background,
+                   "Pictures of the untouched gel, one or more: of these frames, or files elsewhere")
+      ->required();
   command->add_option("--mm-per-px", options->mm_per_px, "Size of a pixel on the gel, mm")
       ->required()
       ->check(CLI::Range(1e-4, 10.0));

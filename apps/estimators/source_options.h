@@ -11,6 +11,11 @@
 
 namespace touchstone::apps {
 
+/// The help of a calibration whose table names frames.
+inline constexpr const char* kTableFramesHelp =
+    "The folder of the pictures; or a video or a data set, whose frames the table names as other tables do: "
+    "clip-000012 is frame 12 of clip.mp4";
+
 /// Where a command's frames come from, and when they were taken.
 struct SourceOptions {
   datasets::SourceChoice choice;

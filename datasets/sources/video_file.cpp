@@ -1,8 +1,10 @@
 #include "datasets/sources/video_file.h"
 
+#include <algorithm>
 #include <array>
 #include <opencv2/imgproc.hpp>
 #include <utility>
+#include <vector>
 
 #include "core/error.h"
 #include "core/whole_file_writer.h"
@@ -13,6 +15,7 @@ namespace {
 
 constexpr double kLeastInterval_us = 1e6 / 60.0;
 constexpr std::int64_t kUsualInterval_us = 40'000;
+constexpr std::size_t kHeld = 6;  // pictures, whose usual interval says how fast it is to be shown
 
 }  // namespace
 
@@ -37,17 +40,55 @@ struct VideoFile::Parts {
     }
   }
 
+  /// Finds how fast it is to be shown, and writes what was held for that.
+  void begin() {
+    std::vector<std::int64_t> intervals;
+    for (std::size_t i = 1; i < held.size(); ++i) {
+      if (held[i].t_us && held[i - 1].t_us && *held[i].t_us > *held[i - 1].t_us) {
+        intervals.push_back(*held[i].t_us - *held[i - 1].t_us);
+      }
+    }
+    if (!intervals.empty()) {
+      const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
+      std::nth_element(intervals.begin(), middle, intervals.end());
+      const auto usual = static_cast<double>(*middle);
+      if (usual < kLeastInterval_us) slowed = static_cast<double>(kUsualInterval_us) / usual;
+    }
+    begun = true;
+    for (const Held& one : std::exchange(held, {})) show(one.picture, one.t_us);
+  }
+
+  void show(const cv::Mat& picture, std::optional<std::int64_t> t_us) {
+    std::int64_t at = output == nullptr ? 0 : shown_us + kUsualInterval_us;
+    if (output == nullptr) origin_us = t_us;
+    if (output != nullptr && t_us && origin_us) {
+      const auto since = static_cast<std::int64_t>(slowed * static_cast<double>(*t_us - *origin_us));
+      if (sequence_from_us + since > shown_us) {
+        at = sequence_from_us + since;
+      } else {
+        origin_us = t_us;  // another sequence
+        sequence_from_us = at;
+      }
+    }
+    write(picture, at);
+    shown_us = at;
+  }
+
+  struct Held {
+    cv::Mat picture;
+    std::optional<std::int64_t> t_us;
+  };
+
   std::filesystem::path file;
   WholeFileWriter whole;
   void* output = nullptr;
   cv::Size size;
-  cv::Mat first;                           ///< until the second one's time is known
-  std::optional<std::int64_t> first_t_us;  ///< its time
-  std::optional<std::int64_t> origin_us;   ///< of this sequence's clock
-  std::int64_t shown_us = 0;               ///< when the last one is
-  std::int64_t sequence_from_us = 0;       ///< when this sequence begins
+  bool begun = false;
+  std::vector<Held> held;                 ///< the first ones, until it has begun
+  std::optional<std::int64_t> origin_us;  ///< of this sequence's clock
+  std::int64_t shown_us = 0;              ///< when the last one is
+  std::int64_t sequence_from_us = 0;      ///< when this sequence begins
   double slowed = 1.0;
-  bool second_seen = false;
 };
 
 VideoFile::VideoFile(const std::filesystem::path& file) {
@@ -59,37 +100,17 @@ VideoFile::~VideoFile() = default;
 
 void VideoFile::add(const cv::Mat& picture, std::optional<std::int64_t> t_us) {
   Parts& p = *parts_;
-  if (picture.type() != CV_8UC3 || picture.empty()) fail("{}: a picture isn't of 8 bit and BGR", p.file.string());
-  if (p.first.empty() && !p.second_seen) {
-    p.first = picture.clone();
-    p.first_t_us = p.origin_us = t_us;
-    return;
+  if (picture.type() != CV_8UC3 || picture.rows < 2 || picture.cols < 2) {
+    fail("{}: a picture isn't of 8 bit and BGR, or has less than 2 x 2 pixels", p.file.string());
   }
-  if (!p.second_seen) {
-    p.second_seen = true;
-    if (t_us && p.first_t_us && *t_us > *p.first_t_us) {
-      const auto interval = static_cast<double>(*t_us - *p.first_t_us);
-      if (interval < kLeastInterval_us) p.slowed = static_cast<double>(kUsualInterval_us) / interval;
-    }
-    p.write(std::exchange(p.first, {}), 0);
-  }
-  std::int64_t at = p.shown_us + kUsualInterval_us;
-  if (t_us && p.origin_us) {
-    const auto since = static_cast<std::int64_t>(p.slowed * static_cast<double>(*t_us - *p.origin_us));
-    if (p.sequence_from_us + since > p.shown_us) {
-      at = p.sequence_from_us + since;
-    } else {
-      p.origin_us = t_us;  // another sequence
-      p.sequence_from_us = at;
-    }
-  }
-  p.write(picture, at);
-  p.shown_us = at;
+  if (p.begun) return p.show(picture, t_us);
+  p.held.push_back({picture.clone(), t_us});
+  if (p.held.size() == kHeld) p.begin();
 }
 
 void VideoFile::finish() {
   Parts& p = *parts_;
-  if (!p.first.empty()) p.write(std::exchange(p.first, {}), 0);
+  if (!p.begun) p.begin();
   if (p.output == nullptr) return;
   std::array<char, 512> message{};
   if (video_module().finish(p.output, message.data(), message.size()) != 0) {

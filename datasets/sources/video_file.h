@@ -10,8 +10,8 @@ namespace touchstone::datasets {
 
 /// Pictures as a video for people: MP4, lossy. The file is there whole or not at all.
 ///
-/// It's shown at the pictures' own times. Where the first two are less than 1/60 s apart, which no screen shows, it's
-/// slowed down so that these are 1/25 s apart; without times all are.
+/// It's shown at the pictures' own times. Where the first ones are usually less than 1/60 s apart, which no screen
+/// shows, it's slowed down so that these are 1/25 s apart; without times all are.
 class VideoFile {
  public:
   /// @throws Error unless the name ends in .mp4 and can be written
@@ -21,7 +21,7 @@ class VideoFile {
   VideoFile(const VideoFile&) = delete;
   VideoFile& operator=(const VideoFile&) = delete;
 
-  /// @param picture 8 bit BGR; of another size than the first it's scaled to that
+  /// @param picture 8 bit BGR, at least 2 x 2; of another size than the first it's scaled to that
   /// @param t_us when it was taken, by its sequence's clock; one that goes back begins another sequence
   /// @throws Error naming the file
   void add(const cv::Mat& picture, std::optional<std::int64_t> t_us);

@@ -24,13 +24,13 @@ int place_in_grid(const std::string& cell, const char* field, int count, const S
 
 }  // namespace
 
-std::vector<AnnotatedMarker> read_hue_sample_table(const fs::path& folder, const fs::path& csv,
+std::vector<AnnotatedMarker> read_hue_sample_table(datasets::TableFrames& frames, const fs::path& csv,
                                                    const Eigen::Vector2i& grid) {
   std::vector<AnnotatedMarker> table;
   datasets::for_each_row(csv, kColumns, [&](const SourceLocation& where, const std::vector<std::string>& cells) {
     AnnotatedMarker line;
     line.where = where;
-    line.file = datasets::file_in(folder, cells[0], where);
+    line.file = frames.named(cells[0], where);
     const int column = place_in_grid(cells[1], "marker_column", grid.x(), where);
     const int row = place_in_grid(cells[2], "marker_row", grid.y(), where);
     line.marker = static_cast<std::size_t>(row * grid.x() + column);
@@ -43,7 +43,8 @@ std::vector<AnnotatedMarker> read_hue_sample_table(const fs::path& folder, const
   return table;
 }
 
-TableSamples read_hue_samples(const std::vector<AnnotatedMarker>& table, sensors::ColourMarkerFinder& finder) {
+TableSamples read_hue_samples(datasets::TableFrames& frames, const std::vector<AnnotatedMarker>& table,
+                              sensors::ColourMarkerFinder& finder) {
   const int columns = finder.rest().grid.x();
   std::map<fs::path, sensors::ColourMarkerReading> readings;
   TableSamples result;
@@ -57,8 +58,8 @@ TableSamples read_hue_samples(const std::vector<AnnotatedMarker>& table, sensors
     auto known = readings.find(line.file);
     if (known == readings.end()) {
       try {
-        datasets::on_picture(
-            line.file, [&](const cv::Mat& image) { known = readings.emplace(line.file, finder.find(image)).first; });
+        datasets::naming(line.file,
+                         [&] { known = readings.emplace(line.file, finder.find(frames.read(line.file))).first; });
       } catch (const Error& error) {
         fail_at(line.where, "{}", error.what());
       }

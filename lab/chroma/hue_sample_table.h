@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "datasets/sources/table_frames.h"
 #include "sensors/colour/colour_marker_finder.h"
 #include "sensors/colour/hue_calibration.h"
 
@@ -23,9 +24,9 @@ struct AnnotatedMarker {
 
 /// Reads a CSV file with the header `file,marker_column,marker_row,x_mm,y_mm,z_mm,series`: how far a marker (columns
 /// and rows count from 0) is displaced in a picture (gel frame: a press is -z), and which press or shear it belongs to.
-/// Files are relative to `folder`. @throws Error with file, line and field
-std::vector<AnnotatedMarker> read_hue_sample_table(const std::filesystem::path& folder,
-                                                   const std::filesystem::path& csv, const Eigen::Vector2i& grid);
+/// Files are `frames`. @throws Error with file, line and field
+std::vector<AnnotatedMarker> read_hue_sample_table(datasets::TableFrames& frames, const std::filesystem::path& csv,
+                                                   const Eigen::Vector2i& grid);
 
 /// What is left of the table once its pictures are read.
 struct TableSamples {
@@ -36,6 +37,7 @@ struct TableSamples {
 /// Reads each picture once. `finder` has seen the picture at rest.
 /// @throws Error with the table's line: a picture that can't be read, isn't a colour one of 8 bit, or has another size
 ///   than that at rest; a marker that isn't sound at rest
-TableSamples read_hue_samples(const std::vector<AnnotatedMarker>& table, sensors::ColourMarkerFinder& finder);
+TableSamples read_hue_samples(datasets::TableFrames& frames, const std::vector<AnnotatedMarker>& table,
+                              sensors::ColourMarkerFinder& finder);
 
 }  // namespace touchstone::lab

@@ -46,7 +46,8 @@ datasets::RunIdentity identity_of_fit(const fs::path& file, const std::optional<
     const fs::path table = recording->folder / "presses.csv";
     std::vector<fs::path> files = {table};
     for (const std::string& name : recording->rest) files.push_back(recording->folder / name);
-    for (const AnnotatedPress& press : read_ball_press_table(recording->folder, table)) files.push_back(press.file);
+    datasets::TableFrames frames(recording->folder);
+    for (const AnnotatedPress& press : read_ball_press_table(frames, table)) files.push_back(press.file);
     for (const fs::path& one : files) {
       inputs.push_back({one.lexically_relative(recording->folder).generic_string(), sha256_of_file(one)});
     }

@@ -1,7 +1,6 @@
 #include "lab/gelsight/ball_press_table.h"
 
 #include "datasets/sets/csv_cells.h"
-#include "sim/files/image_file.h"
 
 namespace touchstone::lab {
 namespace {
@@ -18,12 +17,12 @@ double above_zero(const std::string& cell, const char* field, const SourceLocati
 
 }  // namespace
 
-std::vector<AnnotatedPress> read_ball_press_table(const fs::path& folder, const fs::path& csv) {
+std::vector<AnnotatedPress> read_ball_press_table(datasets::TableFrames& frames, const fs::path& csv) {
   std::vector<AnnotatedPress> table;
   datasets::for_each_row(csv, kColumns, [&](const SourceLocation& where, const std::vector<std::string>& cells) {
     AnnotatedPress press;
     press.where = where;
-    press.file = datasets::file_in(folder, cells[0], where);
+    press.file = frames.named(cells[0], where);
     if (!(cells[1].empty() && cells[2].empty() && cells[3].empty())) {
       sensors::ContactCircle circle;
       circle.centre.x() = datasets::number_in(cells[1], "u_px", where);
@@ -38,24 +37,31 @@ std::vector<AnnotatedPress> read_ball_press_table(const fs::path& folder, const 
   return table;
 }
 
-sensors::Background read_background(const std::vector<fs::path>& files) {
-  std::vector<cv::Mat> frames;
-  for (const fs::path& file : files) {
-    frames.push_back(sim::read_image(file));
-    const cv::Size size = frames.front().size();
-    const std::string fault = sensors::frame_fault(frames.back(), size);
-    if (!fault.empty()) fail("{}: {}", file.string(), fault);
-  }
-  return sensors::mean_background(frames);
+std::vector<fs::path> rest_files(datasets::TableFrames& frames, const std::vector<fs::path>& names) {
+  std::vector<fs::path> files;
+  for (const fs::path& name : names) files.push_back(frames.named_or_file(name));
+  return files;
 }
 
-std::vector<sensors::BallPress> read_ball_presses(const std::vector<AnnotatedPress>& table) {
+sensors::Background read_background(datasets::TableFrames& frames, const std::vector<fs::path>& files) {
+  std::vector<cv::Mat> pictures;
+  for (const fs::path& file : files) {
+    pictures.push_back(frames.read(file));
+    const cv::Size size = pictures.front().size();
+    const std::string fault = sensors::frame_fault(pictures.back(), size);
+    if (!fault.empty()) fail("{}: {}", file.string(), fault);
+  }
+  return sensors::mean_background(pictures);
+}
+
+std::vector<sensors::BallPress> read_ball_presses(datasets::TableFrames& frames,
+                                                  const std::vector<AnnotatedPress>& table) {
   std::vector<sensors::BallPress> presses;
   for (const AnnotatedPress& annotated : table) {
     try {
       sensors::BallPress press;
       press.name = annotated.file.filename().string();
-      press.frame = sim::read_image(annotated.file);
+      press.frame = frames.read(annotated.file);
       press.ball_radius_mm = 0.5 * annotated.ball_diameter_mm;
       press.circle = annotated.circle;
       presses.push_back(std::move(press));

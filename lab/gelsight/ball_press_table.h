@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "datasets/sources/table_frames.h"
 #include "sensors/heights/background.h"
 #include "sensors/heights/ball_press.h"
 
@@ -21,14 +22,18 @@ struct AnnotatedPress {
 
 /// Reads a CSV file with the header `file,u_px,v_px,radius_px,ball_diameter_mm`: the outline of the touched part of the
 /// ball in each picture (u right, v down, the first pixel's centre at 0.5), or three empty cells where it is to be
-/// found. Files are relative to `folder`. @throws Error with file, line and field
-std::vector<AnnotatedPress> read_ball_press_table(const std::filesystem::path& folder,
-                                                  const std::filesystem::path& csv);
+/// found. Files are `frames`. @throws Error with file, line and field
+std::vector<AnnotatedPress> read_ball_press_table(datasets::TableFrames& frames, const std::filesystem::path& csv);
 
-/// The mean of some pictures of the untouched gel. @throws Error naming the picture that's unfit
-sensors::Background read_background(const std::vector<std::filesystem::path>& files);
+/// Pictures of the untouched gel by their names: those of the table's frames, or files elsewhere.
+std::vector<std::filesystem::path> rest_files(datasets::TableFrames& frames,
+                                              const std::vector<std::filesystem::path>& names);
+
+/// The mean of some of them. @throws Error naming the picture that's unfit
+sensors::Background read_background(datasets::TableFrames& frames, const std::vector<std::filesystem::path>& files);
 
 /// Reads the pictures of the table. @throws Error with the table's line for a picture that can't be read
-std::vector<sensors::BallPress> read_ball_presses(const std::vector<AnnotatedPress>& table);
+std::vector<sensors::BallPress> read_ball_presses(datasets::TableFrames& frames,
+                                                  const std::vector<AnnotatedPress>& table);
 
 }  // namespace touchstone::lab

@@ -64,7 +64,7 @@ bool HeightSource::next(SourceHeights& map) {
     const fs::path& file = files_[next_++];
     map.file = file.filename().string();
     map.title = file.string();
-    map.fault = datasets::fault_in([&] { map.height_mm = read(file); });
+    map.fault = datasets::fault_in([&] { map.height_mm = checked(file, [&] { return heights_of(file); }); });
     return true;
   }
   for (;;) {
@@ -83,13 +83,17 @@ bool HeightSource::next(SourceHeights& map) {
   }
 }
 
-cv::Mat HeightSource::read(const fs::path& file) {
-  cv::Mat heights;
+cv::Mat HeightSource::checked(const fs::path& file, const std::function<cv::Mat()>& heights) const {
+  cv::Mat map;
   datasets::naming(file, [&] {
-    heights = estimator_ ? estimated(sim::read_image(file)) : heights_of(file);
-    if (!cv::checkRange(heights)) fail("has heights that aren't finite");
+    map = heights();
+    if (!cv::checkRange(map)) fail("has heights that aren't finite");
   });
-  return heights;
+  return map;
+}
+
+cv::Mat HeightSource::read(datasets::TableFrames& frames, const fs::path& file) {
+  return checked(file, [&] { return estimator_ ? estimated(frames.read(file)) : heights_of(file); });
 }
 
 }  // namespace touchstone::lab

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <opencv2/core/mat.hpp>
 #include <optional>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "datasets/sources/frame_source.h"
+#include "datasets/sources/table_frames.h"
 #include "sensors/heights/height_estimator.h"
 
 namespace touchstone::lab {
@@ -40,13 +42,15 @@ class HeightSource {
   /// The next map; false at the end. @throws Error as FrameSource::next
   bool next(SourceHeights& map);
 
-  /// The heights of a file, which may lie elsewhere: CV_32FC1, mm, finite; good until the next call.
+  /// The heights of a frame that a table names, or of a file of heights: CV_32FC1, mm, finite; good until the next
+  /// call.
   /// @throws Error naming the file if it can't be read, isn't of the model's kind, isn't to be trusted (overexposed,
   /// dark, of one colour), or has no channel `height_mm`
-  cv::Mat read(const std::filesystem::path& file);
+  cv::Mat read(datasets::TableFrames& frames, const std::filesystem::path& file);
 
  private:
   cv::Mat estimated(const cv::Mat& frame);
+  cv::Mat checked(const std::filesystem::path& file, const std::function<cv::Mat()>& heights) const;
 
   std::vector<std::filesystem::path> files_;
   std::vector<datasets::FrameStream> streams_;

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "datasets/sources/table_frames.h"
+
 namespace touchstone::lab {
 
 /// A file of a surface whose material is known.
@@ -12,7 +14,7 @@ struct LabelledMap {
   std::string material;
 };
 
-/// Reads a CSV with the header `file,material`; files are relative to `folder`. @throws Error with file and line
-std::vector<LabelledMap> read_label_table(const std::filesystem::path& folder, const std::filesystem::path& csv);
+/// Reads a CSV with the header `file,material`; files are `frames`. @throws Error with file and line
+std::vector<LabelledMap> read_label_table(datasets::TableFrames& frames, const std::filesystem::path& csv);
 
 }  // namespace touchstone::lab

@@ -53,9 +53,10 @@ void judge_left_out(const std::vector<int>& map_of, TextureCalibration& made) {
 
 }  // namespace
 
-TextureCalibration learn_textures(HeightSource& source, const fs::path& folder, const fs::path& labels,
+TextureCalibration learn_textures(HeightSource& source, const fs::path& place, const fs::path& labels,
                                   const TextureLearning& how, const Progress& progress) {
-  const std::vector<LabelledMap> table = read_label_table(folder, labels);
+  datasets::TableFrames frames(place);
+  const std::vector<LabelledMap> table = read_label_table(frames, labels);
   TextureCalibration made;
   made.model.op = how.op;
   made.model.gray_step_mm = how.gray_step_mm;
@@ -64,7 +65,7 @@ TextureCalibration learn_textures(HeightSource& source, const fs::path& folder, 
   std::int64_t done = 0;
   for (const LabelledMap& one : table) {
     std::string fault = datasets::fault_in([&] {
-      const cv::Mat heights = source.read(one.file);
+      const cv::Mat heights = source.read(frames, one.file);
       datasets::naming(one.file, [&] {
         for (const cv::Mat& square : sensors::squares_of(heights, how.square_px)) {
           sensors::learn_texture(made.model, one.material, square);

@@ -28,10 +28,11 @@ struct TextureCalibration {
   std::vector<std::string> faults = {};  ///< of files that are left out, naming them
 };
 
-/// Learns from the files that `labels` names: a CSV with the header `file,material`, files relative to `folder`.
+/// Learns from the files that `labels` names: a CSV with the header `file,material`, files of `place`, a folder or, of
+/// frames, another recording.
 /// @throws Error with file and line for a table that can't be used; if no file can be; for squares smaller than the
 /// operator needs
-TextureCalibration learn_textures(HeightSource& source, const std::filesystem::path& folder,
+TextureCalibration learn_textures(HeightSource& source, const std::filesystem::path& place,
                                   const std::filesystem::path& labels, const TextureLearning& how,
                                   const Progress& progress = {});
 

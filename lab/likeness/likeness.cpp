@@ -218,13 +218,12 @@ BallRecording read_ball_recording(const LikenessSpec& spec) {
   const bool is_folder = fs::is_directory(spec.recording);
   const fs::path csv = is_folder ? spec.recording / "presses.csv" : spec.recording;
   const fs::path folder = csv.has_parent_path() ? csv.parent_path() : ".";
-  const std::vector<AnnotatedPress> table = read_ball_press_table(folder, csv);
-  std::vector<fs::path> rest;
-  for (const fs::path& name : spec.rest) rest.push_back(fs::exists(folder / name) ? folder / name : name);
+  datasets::TableFrames frames(folder);
+  const std::vector<AnnotatedPress> table = read_ball_press_table(frames, csv);
   BallRecording recording;
   recording.mm_per_px = spec.mm_per_px;
-  recording.rest = read_background(rest);
-  recording.presses = read_ball_presses(table);
+  recording.rest = read_background(frames, rest_files(frames, spec.rest));
+  recording.presses = read_ball_presses(frames, table);
   sensors::GainFinder finder(recording.rest);
   for (std::size_t i = 0; i < recording.presses.size(); ++i) {
     try {

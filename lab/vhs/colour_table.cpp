@@ -17,11 +17,12 @@ namespace fs = std::filesystem;
 
 }  // namespace
 
-ColourCalibration calibrate_colour(const std::vector<fs::path>& card, double smooth_px,
+ColourCalibration calibrate_colour(datasets::TableFrames& frames, const std::vector<fs::path>& card, double smooth_px,
                                    const std::vector<KnownPatch>& patches, const Progress& progress) {
   std::vector<cv::Mat> pictures;
   for (const fs::path& file : card) {
-    datasets::on_picture(file, [&](const cv::Mat& picture) {
+    datasets::naming(file, [&] {
+      const cv::Mat picture = frames.read(file);
       pictures.push_back(picture);
       if (picture.type() != CV_8UC3) fail("isn't a colour picture of 8 bit");
       if (picture.size() != pictures.front().size()) fail("isn't of the first picture's size");
@@ -36,7 +37,7 @@ ColourCalibration calibrate_colour(const std::vector<fs::path>& card, double smo
       datasets::naming(patch.where.file, [&] {
         try {
           auto chart = charts.find(patch.file);
-          if (chart == charts.end()) chart = charts.emplace(patch.file, sim::read_image(patch.file)).first;
+          if (chart == charts.end()) chart = charts.emplace(patch.file, frames.read(patch.file)).first;
           const cv::Mat mask = sensors::rectangle_mask(chart->second.size(), patch.place);
           seen.push_back({sensors::mean_of_white(chart->second, field, mask), patch.lab});
         } catch (const Error& error) {

@@ -19,11 +19,13 @@ struct ColourCalibration {
   double trusted_share = 0.0;            ///< of the picture
   std::vector<std::string> faults = {};  ///< of patches that are left out, naming table and line
 };
-/// @param card pictures of an even white card through the gel @param smooth_px as sensors::flat_field's
+/// @param frames those of the patches, in which the card may be, too @param card pictures of an even white card through
+/// the gel @param smooth_px as sensors::flat_field's
 /// @throws Error as read_patch_table and sensors::flat_field; naming a picture of the card that can't be read; if no
 /// patch can be used
-ColourCalibration calibrate_colour(const std::vector<std::filesystem::path>& card, double smooth_px,
-                                   const std::vector<KnownPatch>& patches, const Progress& progress = {});
+ColourCalibration calibrate_colour(datasets::TableFrames& frames, const std::vector<std::filesystem::path>& card,
+                                   double smooth_px, const std::vector<KnownPatch>& patches,
+                                   const Progress& progress = {});
 
 /// Of a grey picture: each number in it but 0 is a region of that name. @throws Error naming it
 std::vector<NamedRegion> read_region_mask(const std::filesystem::path& picture, const cv::Size& size);

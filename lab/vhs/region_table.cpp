@@ -41,13 +41,13 @@ Eigen::Vector3d colour_in(const std::vector<std::string>& cells, bool srgb, cons
 
 }  // namespace
 
-std::vector<KnownPatch> read_patch_table(const fs::path& folder, const fs::path& csv) {
+std::vector<KnownPatch> read_patch_table(datasets::TableFrames& frames, const fs::path& csv) {
   const std::string head = datasets::header_among(csv, {kPatchPlace + "L,a,b", kPatchPlace + "red,green,blue"});
   const bool srgb = head.ends_with("blue");
   std::vector<KnownPatch> patches;
   datasets::for_each_row(csv, head, [&](const SourceLocation& where, const std::vector<std::string>& cells) {
-    patches.push_back({datasets::file_in(folder, cells[0], where), rectangle_in(cells, 1, where),
-                       colour_in(cells, srgb, where), where});
+    patches.push_back(
+        {frames.named(cells[0], where), rectangle_in(cells, 1, where), colour_in(cells, srgb, where), where});
   });
   if (patches.empty()) fail("{}: has no patch", csv.string());
   return patches;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "datasets/sources/table_frames.h"
 
 namespace touchstone::lab {
 
@@ -20,9 +21,9 @@ struct KnownPatch {
 };
 
 /// Reads a CSV with the header `file,left_px,top_px,width_px,height_px,L,a,b` (CIE L*a*b* under D65) or
-/// `file,left_px,top_px,width_px,height_px,red,green,blue` (sRGB, 0 to 255). Files are relative to `folder`.
+/// `file,left_px,top_px,width_px,height_px,red,green,blue` (sRGB, 0 to 255). Files are `frames`.
 /// @throws Error with file, line and field
-std::vector<KnownPatch> read_patch_table(const std::filesystem::path& folder, const std::filesystem::path& csv);
+std::vector<KnownPatch> read_patch_table(datasets::TableFrames& frames, const std::filesystem::path& csv);
 
 /// A part of each picture, with a name.
 struct NamedRegion {

@@ -11,6 +11,7 @@
 #include "tests/apps/run_program.h"
 #include "tests/sensors/heights/painted_darkness.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/written_video.h"
 
 namespace touchstone {
 namespace {
@@ -90,6 +91,35 @@ TEST_F(DtactCommands, MistakesAreRefusedByName) {
   expect_refused(
       run_program({"estimate", "9dtact", "--model", in("cal/rest.png"), "--frames", in("new"), "-o", in("out")}),
       "isn't a darkness model");
+}
+
+TEST_F(DtactCommands, AVideosFramesMakeTheModelOfTheirPictures) {
+  ASSERT_EQ(calibrate(std::string(kHeader) + "a.png,162,118,60.7,8\nb.png,,,,8\n").exit_code, 0);
+  std::vector<cv::Mat> frames;
+  for (const char* const name : {"rest", "a", "b"}) {
+    frames.push_back(sim::read_image(folder_.path() / "cal" / (std::string(name) + ".png")));
+  }
+  test::write_video(folder_.path() / "clip.mkv", frames);
+  const auto by_video = [&](const std::string& lines, const std::string& rest) {
+    const fs::path csv = folder_.write("video.csv", kHeader + lines);
+    return run_program({"calibrate", "9dtact", "--frames", in("clip.mkv"), "--annotations", csv.string(), "--mm-per-px",
+                        "0.05", "-o", in("v.dark"), "--rest", rest});
+  };
+  const ProgramRun made = by_video("clip-000001,162,118,60.7,8\nclip-000002,,,,8\n", "clip-000000");
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_THAT(made.out, AllOf(HasSubstr("clip-000002: contact found at"), HasSubstr("2 presses")));
+  EXPECT_EQ(read_whole_file(folder_.path() / "v.dark"), read_whole_file(folder_.path() / "m.dark"));
+  const ProgramRun elsewhere = by_video("clip-000001,162,118,60.7,8\n", in("cal/rest.png"));
+  EXPECT_EQ(elsewhere.exit_code, 0) << elsewhere.err;
+  fs::remove(folder_.path() / "v.dark");
+  test::expect_refused(by_video("clip-000009,162,118,60.7,8\n", "clip-000000"),
+                       "video.csv:2: " + in("clip.mkv") + ": has no frame 'clip-000009'");
+  test::expect_refused(by_video("clip-000001,162,118,60.7,8\n", "clip-000077"), "has no frame 'clip-000077'");
+  test::expect_refused(by_video(",162,118,60.7,8\n", "clip-000000"), "video.csv:2: file: names no frame");
+  EXPECT_FALSE(fs::exists(folder_.path() / "v.dark"));
+  const ProgramRun live = run_program({"calibrate", "9dtact", "--frames", "0", "--annotations", in("video.csv"),
+                                       "--mm-per-px", "0.05", "-o", in("v.dark"), "--rest", in("cal/rest.png")});
+  test::expect_refused(live, "0: is live; a recording is needed");
 }
 
 }  // namespace

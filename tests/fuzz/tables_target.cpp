@@ -27,10 +27,11 @@ bool reads(std::string_view bytes) {
   static const bool made = std::ofstream(folder / "a.png").good() &&
                            (std::ofstream(folder / "f.csv") << "t_us,force_N\n0,0\n4000,0.5\n8000,1\n").good();
   TS_ASSERT(made);
+  datasets::TableFrames frames(folder);
   bool read = gives_result([&] { datasets::frames_of_force_table(folder, table); });
-  read |= gives_result([&] { lab::read_ball_press_table(folder, table); });
-  read |= gives_result([&] { lab::read_hue_sample_table(folder, table, {7, 5}); });
-  read |= gives_result([&] { lab::read_label_table(folder, table); });
+  read |= gives_result([&] { lab::read_ball_press_table(frames, table); });
+  read |= gives_result([&] { lab::read_hue_sample_table(frames, table, {7, 5}); });
+  read |= gives_result([&] { lab::read_label_table(frames, table); });
   read |= gives_result([&] { lab::read_place_map(table, {320, 240}); });
   read |= gives_result([&] { lab::read_grasp_table(table, lab::GraspNeeds::forces); });
   read |= gives_result([&] { lab::read_grasp_table(table, lab::GraspNeeds::materials); });
@@ -43,7 +44,7 @@ bool reads(std::string_view bytes) {
     sensors::train_reflex(known.recordings, {.tree = {.folds = 2}});
   });
   read |= gives_result([&] { lab::read_press_table(table); });
-  read |= gives_result([&] { lab::read_patch_table(folder, table); });
+  read |= gives_result([&] { lab::read_patch_table(frames, table); });
   read |= gives_result([&] { lab::read_region_table(table, {160, 120}); });
   for (const auto kind : {render::CurveKind::share, render::CurveKind::relative, render::CurveKind::per_mm}) {
     read |= gives_result([&] {

@@ -73,6 +73,16 @@ TEST_F(VideoFileTest, AThousandFramesASecondAreSlowedDownAndASecondSequenceFollo
   }
 }
 
+TEST_F(VideoFileTest, OneShortIntervalSlowsNothingDown) {
+  VideoFile video(in("a.mp4"));
+  std::int64_t t_us = 0;
+  for (int i = 0; i < 8; ++i)
+    video.add(disc_at(i), t_us += i == 1 ? 500 : 40'000);  // as a live camera's first ones may be
+  video.finish();
+  EXPECT_EQ(video.slowed(), 1.0);
+  EXPECT_EQ(frames_in(in("a.mp4")).size(), 8U);
+}
+
 TEST_F(VideoFileTest, WithoutTimesTwentyFiveASecondAndOddSizesLoseARow) {
   VideoFile video(in("odd.mp4"));
   for (int i = 0; i < 3; ++i) video.add(disc_at(i, {99, 65}), std::nullopt);
@@ -111,6 +121,7 @@ TEST_F(VideoFileTest, NamesAndPlacesThatCantBeAreNamed) {
   EXPECT_THAT(message_of([&] { VideoFile(in("no-such-folder/a.mp4")); }), HasSubstr("a.mp4: can't be written"));
   VideoFile video(in("grey.mp4"));
   EXPECT_THAT(message_of([&] { video.add(cv::Mat(8, 8, CV_8UC1, cv::Scalar(0)), 0); }), HasSubstr("grey.mp4"));
+  EXPECT_THAT(message_of([&] { video.add(cv::Mat(1, 8, CV_8UC3, cv::Scalar(0)), 0); }), HasSubstr("2 x 2 pixels"));
 }
 
 }  // namespace

@@ -25,8 +25,9 @@ class RealFrames : public ::testing::Test {
  protected:
   void SetUp() override {
     TS_NEEDS_RECORDINGS(folder_);
-    background_ = read_background({folder_ / "rest.png"});
-    presses_ = read_ball_presses(read_ball_press_table(folder_, folder_ / "presses.csv"));
+    datasets::TableFrames frames(folder_);
+    background_ = read_background(frames, {folder_ / "rest.png"});
+    presses_ = read_ball_presses(frames, read_ball_press_table(frames, folder_ / "presses.csv"));
     ASSERT_GE(presses_.size(), 10U);
   }
   static sensors::HeightCalibrationSettings settings(sensors::SlopeRegressor slopes) {
