@@ -93,6 +93,8 @@ std::string VideoOutput::open(const std::string& file, int width, int height) {
   } else {
     av_opt_set(p.encoder->priv_data, "crf", kConstantQuality, 0);
     av_opt_set(p.encoder->priv_data, "preset", "veryfast", 0);
+    // With both, its assembly reads memory that nobody has set: the same pictures made other bytes from time to time.
+    av_opt_set(p.encoder->priv_data, "x264-params", "bframes=0:no-mbtree=1", 0);
   }
   code = avcodec_open2(p.encoder, codec, nullptr);
   if (code >= 0) code = avcodec_parameters_from_context(p.stream->codecpar, p.encoder);

@@ -94,13 +94,21 @@ TEST_F(VideoFileTest, WithoutTimesTwentyFiveASecondAndOddSizesLoseARow) {
   EXPECT_NEAR(static_cast<double>(frames[3].label.t_us), 120'000.0, 1000.0);
 }
 
+// Memory that was used before isn't zero: what an encoder reads of it without having set it shows in the bytes.
 TEST_F(VideoFileTest, TheSamePicturesMakeTheSameBytes) {
-  for (const char* const name : {"a.mp4", "b.mp4"}) {
+  for (const char* const name : {"a.mp4", "b.mp4", "c.mp4"}) {
+    {
+      std::vector<std::vector<unsigned char>> used;
+      for (int i = 0; i < 200; ++i) {
+        used.emplace_back(static_cast<std::size_t>(1000 + 997 * i), static_cast<unsigned char>(31 * i + name[0]));
+      }
+    }
     VideoFile video(in(name));
-    for (int i = 0; i < 5; ++i) video.add(disc_at(i), 40'000 * i);
+    for (int i = 0; i < 9; ++i) video.add(disc_at(i), 40'000 * i);
     video.finish();
   }
   EXPECT_EQ(read_whole_file(in("a.mp4")), read_whole_file(in("b.mp4")));
+  EXPECT_EQ(read_whole_file(in("a.mp4")), read_whole_file(in("c.mp4")));
 }
 
 TEST_F(VideoFileTest, WhatIsntFinishedOrHasNoPictureIsntThere) {
