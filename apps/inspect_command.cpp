@@ -9,6 +9,7 @@
 #include "datasets/inspection/estimate_page.h"
 #include "datasets/inspection/inspected_draw.h"
 #include "datasets/inspection/inspection_page.h"
+#include "datasets/inspection/page_parts.h"
 #include "datasets/sources/frame_sequence.h"
 #include "sim/files/image_file.h"
 
@@ -24,14 +25,6 @@ struct InspectOptions {
   int tiles_per_scene = 6;
   int tile_width = 240;
 };
-
-/// `count` numbers spread evenly from 0 to `size` - 1, both ends among them.
-std::vector<std::size_t> spread(std::size_t size, std::size_t count) {
-  std::vector<std::size_t> chosen;
-  count = std::min(size, count);
-  for (std::size_t i = 0; i < count; ++i) chosen.push_back(count == 1 ? size - 1 : i * (size - 1) / (count - 1));
-  return chosen;
-}
 
 void write_page(const InspectOptions& options) {
   const datasets::InspectedSet set = datasets::read_inspected_set(options.data);
@@ -56,7 +49,8 @@ void write_page(const InspectOptions& options) {
 void add_frames_of_scenes(const InspectOptions& options, std::vector<cv::Mat>& pictures,
                           std::vector<std::string>& captions) {
   for (const datasets::FrameSequence& sequence : datasets::frames_of_data_set(options.data, std::nullopt)) {
-    for (const std::size_t i : spread(sequence.frames.size(), static_cast<std::size_t>(options.tiles_per_scene))) {
+    for (const std::size_t i :
+         datasets::spread_over(0, sequence.frames.size(), static_cast<std::size_t>(options.tiles_per_scene))) {
       const datasets::LabelledFrame& frame = sequence.frames[i];
       pictures.push_back(sim::read_image(frame.file));
       captions.push_back(fmt::format("{} {}\n{:.2f} {:.2f} {:.2f} N", sequence.name, frame.frame, frame.force->x(),
@@ -70,7 +64,7 @@ void add_frames_of_units(const InspectOptions& options, std::vector<cv::Mat>& pi
   const datasets::InspectedSet set = datasets::read_inspected_set(options.data);
   for (const datasets::InspectedScene& unit : set.scenes) {
     const auto each = static_cast<std::size_t>(options.tiles_per_scene);
-    for (const std::size_t i : spread(static_cast<std::size_t>(unit.samples), each)) {
+    for (const std::size_t i : datasets::spread_over(0, static_cast<std::size_t>(unit.samples), each)) {
       const std::size_t sample = static_cast<std::size_t>(unit.first_sample) + i;
       pictures.push_back(datasets::inspected_frame(set, sample));
       if (pictures.back().empty()) fail("{}: has no frames", options.data.string());

@@ -28,9 +28,11 @@ struct ReadTable {
   const EstimateTable& table;
   EstimateParts parts;
   std::vector<EstimateSequence> sequences;
-  bool many_lines = false;  ///< of one frame
+  const EstimateColumn* trusted;  ///< null: it doesn't say
+  bool many_lines = false;        ///< of one frame
 
-  explicit ReadTable(const EstimateTable& from) : table(from), parts(parts_of(from)), sequences(sequences_of(from)) {
+  explicit ReadTable(const EstimateTable& from)
+      : table(from), parts(parts_of(from)), sequences(sequences_of(from)), trusted(from.column("trusted")) {
     for (const EstimateSequence& sequence : sequences) {
       for (const EstimateFrame& frame : sequence.frames) many_lines |= frame.count > 1;
     }
@@ -167,8 +169,7 @@ std::string states(const ReadTable& one, const EstimateSequence& sequence) {
 }
 
 bool is_trusted(const ReadTable& one, std::size_t line) {
-  const EstimateColumn* const trusted = one.table.column("trusted");
-  return trusted == nullptr || trusted->numbers[line] != 0.0;
+  return one.trusted == nullptr || one.trusted->numbers[line] != 0.0;
 }
 
 /// How far a component is off, over the frames that are trusted.
@@ -220,7 +221,7 @@ std::string errors(const ReadTable& one) {
     }
   }
   if (rows.empty()) return "";
-  const bool all = one.table.column("trusted") == nullptr;
+  const bool all = one.trusted == nullptr;
   std::vector<std::string> head = {"",     "unit",    "frames",     "root mean square", "of the largest true value",
                                    "mean", "largest", "true values"};
   if (with_bars) head.push_back("within two error bars");
@@ -248,8 +249,7 @@ std::string name_of_frame(const ReadTable& one, const EstimateSequence& sequence
   for (const char* const key : {"file", "frame"}) {
     const EstimateColumn* const column = one.table.column(key);
     if (column == nullptr) continue;
-    std::string text = column->word(line);
-    if (text.empty() && !std::isnan(column->numbers[line])) text = fmt::format("{:.15g}", column->numbers[line]);
+    const std::string text = column->text(line);
     if (text.empty()) continue;
     return name.empty() ? text : name + ": " + text;
   }
@@ -258,7 +258,7 @@ std::string name_of_frame(const ReadTable& one, const EstimateSequence& sequence
 
 /// Frames that aren't to be trusted, or that have a remark.
 std::string doubtful(const ReadTable& one, int most) {
-  if (one.table.column("trusted") == nullptr && one.parts.remarks.empty()) return "";
+  if (one.trusted == nullptr && one.parts.remarks.empty()) return "";
   std::string rows;
   int count = 0;
   for (const EstimateSequence& sequence : one.sequences) {

@@ -66,15 +66,11 @@ bool is_flag(const EstimateColumn& column) {
                              [](double value) { return std::isnan(value) || value == 0.0 || value == 1.0; });
 }
 
-bool begins(const std::string& name, std::string_view word) {
-  return name.starts_with(word);
-}
-
 /// The true values of a column, by its name.
 const EstimateColumn* truth_of(const EstimateTable& table, const std::string& name) {
   if (const EstimateColumn* const truth = table.column("true_" + name)) return truth;
   constexpr std::string_view kForce = "force_";
-  return begins(name, kForce) ? table.column("true_" + name.substr(kForce.size())) : nullptr;
+  return name.starts_with(kForce) ? table.column("true_" + name.substr(kForce.size())) : nullptr;
 }
 
 }  // namespace
@@ -83,8 +79,8 @@ EstimateParts parts_of(const EstimateTable& table) {
   EstimateParts parts;
   const bool many_lines = table.column("marker") != nullptr || table.column("bead") != nullptr;
   for (const EstimateColumn& column : table.columns) {
-    if (std::ranges::find(kKeys, column.name) != kKeys.end() || begins(column.name, "true_") ||
-        begins(column.name, "sigma_")) {
+    if (std::ranges::find(kKeys, column.name) != kKeys.end() || column.name.starts_with("true_") ||
+        column.name.starts_with("sigma_")) {
       continue;
     }
     if (!column.is_numeric()) {

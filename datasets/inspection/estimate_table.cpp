@@ -74,6 +74,10 @@ std::string EstimateColumn::word(std::size_t line) const {
   return words[line] < 0 ? "" : distinct[static_cast<std::size_t>(words[line])];
 }
 
+std::string EstimateColumn::text(std::size_t line) const {
+  return std::isnan(numbers[line]) ? word(line) : fmt::format("{:.15g}", numbers[line]);
+}
+
 const EstimateColumn* EstimateTable::column(const std::string& name) const {
   const auto found = std::ranges::find(columns, name, &EstimateColumn::name);
   return found == columns.end() ? nullptr : &*found;
@@ -118,11 +122,7 @@ std::vector<EstimateSequence> sequences_of(const EstimateTable& table) {
   for (std::size_t line = 0; line < table.lines; ++line) {
     const bool starts = line == 0 || (sequence != nullptr && !same_cell(*sequence, line, line - 1));
     if (starts) {
-      std::string name = sequence == nullptr ? "" : sequence->word(line);
-      if (sequence != nullptr && name.empty() && !std::isnan(sequence->numbers[line])) {
-        name = fmt::format("{:.15g}", sequence->numbers[line]);
-      }
-      sequences.push_back({.name = std::move(name)});
+      sequences.push_back({.name = sequence == nullptr ? "" : sequence->text(line)});
     }
     std::vector<EstimateFrame>& frames = sequences.back().frames;
     if (!frames.empty() && frame != nullptr && same_cell(*frame, line, line - 1)) {

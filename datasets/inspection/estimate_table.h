@@ -19,6 +19,8 @@ struct EstimateColumn {
   bool is_numeric() const;
   /// The cell's word; "" where it holds none.
   std::string word(std::size_t line) const;
+  /// The cell as a text, number or word; "" where it's empty.
+  std::string text(std::size_t line) const;
 };
 
 /// The lines of a table. Several may belong to one frame (a line for each marker).

@@ -1,5 +1,5 @@
 #pragma once
-// What the HTML pages share. Internal to datasets.
+// What the HTML pages and sheets share.
 
 #include <opencv2/core/mat.hpp>
 #include <string>
