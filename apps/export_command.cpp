@@ -6,6 +6,8 @@
 #include "apps/progress_bar.h"
 #include "core/error.h"
 #include "core/whole_file.h"
+#include "datasets/exports/estimate_hdf5.h"
+#include "datasets/inspection/estimate_page.h"
 #include "datasets/sets/run_identity.h"
 #include "lab/press/marker_compliance_export.h"
 #include "sensors/events/event_file.h"
@@ -97,11 +99,38 @@ void add_events_command(CLI::App& exports, Action& action) {
   command->callback([&action, options] { action = [options] { export_events(*options); }; });
 }
 
+struct TableOptions {
+  std::filesystem::path in;
+  std::filesystem::path out;
+};
+
+void export_tables(const TableOptions& options) {
+  require_writable_place(options.out);
+  const std::vector<datasets::EstimateTable> tables = datasets::estimate_tables(options.in);
+  datasets::write_hdf5(tables, options.out);
+  fmt::print("{}:", options.out.string());
+  for (const datasets::EstimateTable& table : tables) {
+    fmt::print(" {} ({} columns, {} lines)", table.file.stem().string(), table.columns.size(), table.lines);
+  }
+  fmt::print("\n");
+}
+
+void add_tables_command(CLI::App& exports, Action& action) {
+  CLI::App* command = exports.add_subcommand("tables", "Tables of estimates as one HDF5 file, with units");
+  auto options = std::make_shared<TableOptions>();
+  command
+      ->add_option("ESTIMATES", options->in,
+                   "What `touchstone estimate` wrote: its folder, or one of its tables (.csv)")
+      ->required();
+  command->add_option("-o,--out", options->out, "The file to write: .h5")->required();
+  command->callback([&action, options] { action = [options] { export_tables(*options); }; });
+}
+
 }  // namespace
 
 void add_export_command(CLI::App& app, const GlobalOptions& global, Action& action) {
   CLI::App* exports = app.add_subcommand(
-      "export", "Write what estimators need to know of a device, or events or a data set in another format");
+      "export", "Write what estimators need to know of a device, or events, estimates or a data set in another format");
   exports->require_subcommand(1);
   exports->fallthrough();
   CLI::App* command = exports->add_subcommand(
@@ -114,6 +143,7 @@ void add_export_command(CLI::App& app, const GlobalOptions& global, Action& acti
   command->callback(
       [&action, &global, options] { action = [&global, options] { export_compliance(*options, global); }; });
   add_events_command(*exports, action);
+  add_tables_command(*exports, action);
   add_webdataset_export(*exports, global, action);
 }
 

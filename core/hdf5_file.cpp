@@ -299,6 +299,7 @@ void Hdf5Writer::write_texts(const Hdf5Description& description, const std::vect
     std::copy(texts[i].begin(), texts[i].end(), padded.begin() + static_cast<std::ptrdiff_t>(i * longest));
   }
   const Handle type = text_type(longest);
+  make_group_of(description.path);
   const hsize_t count = texts.size();
   const Handle space(check(H5Screate_simple(1, &count, nullptr), "shape"), H5Sclose);
   const Handle creation(check(H5Pcreate(H5P_DATASET_CREATE), "dataset creation"), H5Pclose);

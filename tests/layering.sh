@@ -55,8 +55,8 @@ sim/grasp: core fem/mesh fem/elements fem/contact fem/error fem/fine_relief fem/
 datasets/jobs: core render/lamps sim/relief sim/scene sim/plan sim/press sim/sensor sim/need
 datasets/sets: core fem/elements sensors/events sim/files sim/scene sim/plan sim/need sim/press sim/view sim/sensor sim/cost datasets/jobs
 datasets/sources: core sensors/events sim/files datasets/jobs datasets/sets
-datasets/exports: core sim/files datasets/sets
 datasets/inspection: core plots render/cameras render/imager sim/files sim/scene sim/plan sim/view datasets/jobs datasets/sets
+datasets/exports: core sim/files datasets/sets datasets/inspection
 lab/statistics: core
 lab/validation: core plots fem/error sim/scene sim/sensor lab/statistics
 lab/press: core fem/elements fem/shapes fem/contact fem/finite_strain render/scene render/cameras sensors/tractions sim/scene

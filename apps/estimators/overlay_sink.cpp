@@ -15,8 +15,7 @@ OverlaySink::OverlaySink(const PictureOptions& options, std::filesystem::path fo
   if (!options.video.empty()) video_ = std::make_unique<datasets::VideoFile>(options.video);
   if (!options.live) return;
   view_ = std::make_unique<LiveView>(title, options.port);
-  fmt::print("live: http://127.0.0.1:{}/\n", view_->port());
-  std::fflush(stdout);
+  fmt::print(stderr, "live: http://127.0.0.1:{}/\n", view_->port());
 }
 
 void OverlaySink::take(const datasets::SourceFrame& frame, const cv::Mat& picture) {
@@ -38,7 +37,7 @@ void OverlaySink::begin_again() {
 void OverlaySink::finish() {
   if (!video_) return;
   video_->finish();
-  fmt::print("{}: {}\n", options_.video.string(),
+  fmt::print(stderr, "{}: {}\n", options_.video.string(),
              video_->slowed() > 1.0 ? fmt::format("shown {:.3g} times slower than it was", video_->slowed())
                                     : "shown as fast as it was");
 }

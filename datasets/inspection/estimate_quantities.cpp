@@ -10,18 +10,23 @@ namespace touchstone::datasets {
 namespace {
 
 constexpr std::array<const char*, 6> kKeys = {"sequence", "frame", "file", "t_us", "marker", "bead"};
-constexpr std::array<std::pair<const char*, const char*>, 12> kUnits = {{{"Nmm", "N mm"},
-                                                                         {"N", "N"},
-                                                                         {"mm2", "mm\xC2\xB2"},
-                                                                         {"mm3", "mm\xC2\xB3"},
-                                                                         {"mm", "mm"},
-                                                                         {"um", "\xC2\xB5m"},
-                                                                         {"px", "px"},
-                                                                         {"deg", "degrees"},
-                                                                         {"percent", "%"},
-                                                                         {"MPa", "MPa"},
-                                                                         {"Hz", "Hz"},
-                                                                         {"s", "s"}}};
+
+struct Unit {
+  const char *suffix, *printed, *plain;
+};
+constexpr std::array<Unit, 13> kUnits = {{{"Nmm", "N mm", "N mm"},
+                                          {"N", "N", "N"},
+                                          {"mm2", "mm\xC2\xB2", "mm^2"},
+                                          {"mm3", "mm\xC2\xB3", "mm^3"},
+                                          {"mm", "mm", "mm"},
+                                          {"um", "\xC2\xB5m", "um"},
+                                          {"us", "\xC2\xB5s", "us"},
+                                          {"px", "px", "px"},
+                                          {"deg", "degrees", "deg"},
+                                          {"percent", "%", "%"},
+                                          {"MPa", "MPa", "MPa"},
+                                          {"Hz", "Hz", "Hz"},
+                                          {"s", "s", "s"}}};
 constexpr std::array<const char*, 7> kAxes = {"x", "y", "z", "u", "v", "dx", "dy"};
 constexpr std::size_t kMostStates = 12, kLongestState = 24;
 
@@ -46,9 +51,9 @@ bool take_word(std::string& text, std::string_view word) {
 NameParts name_parts(const std::string& name) {
   NameParts parts;
   parts.stem = name;
-  for (const auto& [suffix, unit] : kUnits) {
-    if (take_word(parts.stem, suffix)) {
-      parts.unit = unit;
+  for (const Unit& unit : kUnits) {
+    if (take_word(parts.stem, unit.suffix)) {
+      parts.unit = unit.printed;
       break;
     }
   }
@@ -74,6 +79,13 @@ const EstimateColumn* truth_of(const EstimateTable& table, const std::string& na
 }
 
 }  // namespace
+
+std::string unit_of_column(std::string name) {
+  for (const Unit& unit : kUnits) {
+    if (take_word(name, unit.suffix)) return unit.plain;
+  }
+  return "1";
+}
 
 EstimateParts parts_of(const EstimateTable& table) {
   EstimateParts parts;

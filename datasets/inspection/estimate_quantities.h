@@ -32,6 +32,9 @@ struct EstimateParts {
   std::vector<const EstimateColumn*> remarks;  ///< longer texts: `fault`
 };
 
+/// The unit that a column's name ends in, in ASCII: "mm^2" of `contact_mm2`; "1" where there is none.
+std::string unit_of_column(std::string name);
+
 /// Sorts a table's columns, those that name lines (`sequence`, `frame`, `file`, `t_us`, `marker`) left out.
 EstimateParts parts_of(const EstimateTable& table);
 

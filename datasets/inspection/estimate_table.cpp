@@ -17,10 +17,12 @@ namespace {
 /// Adds cells to a column.
 class ColumnFiller {
  public:
-  explicit ColumnFiller(EstimateColumn& column) : column_(column) {}
+  /// Names of sequences and files are words, even where they look like numbers.
+  explicit ColumnFiller(EstimateColumn& column)
+      : column_(column), names_(column.name == "sequence" || column.name == "file") {}
 
   void add(const std::string& cell) {
-    const auto value = number_of<double>(cell);
+    const auto value = names_ ? std::nullopt : number_of<double>(cell);
     const bool is_number = value && std::isfinite(*value);
     column_.numbers.push_back(is_number ? *value : std::numeric_limits<double>::quiet_NaN());
     column_.words.push_back(is_number || cell.empty() ? -1 : index_of(cell));
@@ -34,6 +36,7 @@ class ColumnFiller {
   }
 
   EstimateColumn& column_;
+  bool names_;
   std::unordered_map<std::string, std::int32_t> known_;
 };
 

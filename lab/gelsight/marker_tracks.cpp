@@ -191,7 +191,7 @@ MarkerTrack follow(const datasets::FrameStream& stream, Opened& one, const Marke
       const sensors::TrackedMarkers& markers = follower.markers();
       add_markers(start, markers, lines);
       if (touch != nullptr) {
-        touch_text = touch_line(start, *touch);
+        touch_text = touch_line(start, *touch, label.force);
         track.touches.add(*touch, label.force);
       }
       ++track.frames;

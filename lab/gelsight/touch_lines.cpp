@@ -12,7 +12,7 @@
 namespace touchstone::lab {
 namespace {
 
-constexpr int kCells = 23;  ///< between touch_line's start and the status
+constexpr int kCells = 26;  ///< between touch_line's start and the status
 
 std::string known(const std::optional<double>& value) {
   return value ? fmt::format("{:.6g}", *value) : std::string();
@@ -26,11 +26,13 @@ double degrees(double radians) {
 
 std::string touch_header() {
   return "sequence,frame,file,t_us,touched,contact_px,u_px,v_px,markers,moved_u_px,moved_v_px,turn_deg,sigma_turn_deg,"
-         "highest_mm,force_x_N,force_y_N,force_z_N,sigma_force_x_N,sigma_force_y_N,sigma_force_z_N,extrapolated,"
-         "motion_ratio,force_ratio,ratios_slip,lag,sigma_lag,slip,trusted,status\n";
+         "highest_mm,force_x_N,force_y_N,force_z_N,sigma_force_x_N,sigma_force_y_N,sigma_force_z_N,true_x_N,true_y_N,"
+         "true_z_N,"
+         "extrapolated,motion_ratio,force_ratio,ratios_slip,lag,sigma_lag,slip,trusted,status\n";
 }
 
-std::string touch_line(const std::string& start, const sensors::TouchReading& touch) {
+std::string touch_line(const std::string& start, const sensors::TouchReading& touch,
+                       const std::optional<Eigen::Vector3d>& true_force_N) {
   std::string line = start;
   const auto add = [&](const std::string& cell) { line += cell + ","; };
   const auto add_if = [&](bool there, double value) { add(there ? fmt::format("{:.6g}", value) : std::string()); };
@@ -53,6 +55,7 @@ std::string touch_line(const std::string& start, const sensors::TouchReading& to
   add_if(shear, touch.shear_error_N);
   add_if(shear, touch.shear_error_N);
   add_if(normal, touch.normal_error_N);
+  for (int axis = 0; axis < 3; ++axis) add_if(true_force_N.has_value(), true_force_N ? (*true_force_N)[axis] : 0.0);
   add(shear || normal ? fmt::format("{}", touch.beyond_calibration ? 1 : 0) : "");
   add(known(touch.motion_ratio));
   add(known(touch.force_ratio));

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "datasets/sources/frame_sequence.h"
@@ -15,7 +16,9 @@ namespace touchstone::lab {
 std::string touch_header();
 
 /// A frame's line. @param start what it begins with: sequence, frame, file and time, with a comma at the end
-std::string touch_line(const std::string& start, const sensors::TouchReading& touch);
+/// @param true_force_N on the object, x along u, y along v, where it's known
+std::string touch_line(const std::string& start, const sensors::TouchReading& touch,
+                       const std::optional<Eigen::Vector3d>& true_force_N);
 
 /// The line of a frame that can't be used, which says why.
 std::string touch_fault_line(const std::string& start, const std::string& fault);

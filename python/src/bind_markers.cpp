@@ -82,6 +82,10 @@ void bind_markers(py::module_& module) {
       .def_property_readonly("found", &TrackedMarkers::found, "Markers measured in this frame.")
       .def_readonly("jumped", &TrackedMarkers::jumped,
                     "Markers went farther than can be followed: until the gel is at rest again none is trusted.")
+      .def_readonly(
+          "rest_was_touched", &TrackedMarkers::rest_was_touched,
+          "This frame or one before has shown that the gel was touched in the frame at rest, so displacements "
+          "are from no rest. Known where markers lie in rows.")
       .def_property_readonly(
           "light", [](const TrackedMarkers& self) { return sensors::name_of(self.light); },
           "Of the frame: 'normal', 'dark', 'saturated' or 'flat'; only in a normal one markers are measured.");

@@ -80,7 +80,9 @@ class ClearView final : public SensorView {
   Truth start_of(const SeenObject& object, const Eigen::Vector3d& start) const {
     MotionSpec still;
     still.start_mm = start;
-    const SceneSpec scene = scene_of(object.spec, still);
+    ObjectSpec rigid = object.spec;
+    rigid.elastic.reset();  // nothing touches it yet
+    const SceneSpec scene = scene_of(rigid, still);
     return play_motion(scene, make_plan(scene), gel_).front();
   }
 

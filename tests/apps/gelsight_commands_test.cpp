@@ -87,7 +87,7 @@ TEST_F(GelsightCommands, RecordedFramesGiveHeightMaps) {
   const ProgramRun levels = run_program({"estimate", "gelsight", "--model", in("m.gel"), "--frames", in("new"), "-o",
                                          in("png"), "--format", "png16", "--live", "0", "--overlay"});
   ASSERT_EQ(levels.exit_code, 0) << levels.err;
-  EXPECT_THAT(levels.out, HasSubstr("live: http://127.0.0.1:"));
+  EXPECT_THAT(levels.err, HasSubstr("live: http://127.0.0.1:"));
   const cv::Mat drawn = sim::read_image(folder_.path() / "png/overlay/ball.png");
   EXPECT_EQ(drawn.size(), cv::Size(2 * map.image.cols, map.image.rows));
   cv::Mat from_levels;

@@ -104,7 +104,7 @@ TEST_F(MarkersCommand, PicturesMakeAVideoAndTablesAReport) {
   const auto run = run_program({"estimate", "markers", in("frames"), "-o", in("out"), "--touch", "--overlay", "--video",
                                 in("seen.mp4"), "--rate", "25"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
-  EXPECT_THAT(run.out, HasSubstr("seen.mp4: shown as fast as it was"));
+  EXPECT_THAT(run.err, HasSubstr("seen.mp4: shown as fast as it was"));
   EXPECT_GT(fs::file_size(folder_.path() / "seen.mp4"), 1000U);
   const auto report = run_program({"inspect", in("out"), "-o", in("report.html")});
   ASSERT_EQ(report.exit_code, 0) << report.err;

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
+#include "core/hdf5_file.h"
 #include "core/whole_file.h"
 #include "sensors/heights/height_model_file.h"
 #include "sensors/markers/linear_force.h"
@@ -104,6 +105,8 @@ TEST_F(TouchCommands, KnownForcesGiveAModelThatReadsOthers) {
     EXPECT_NEAR(number("force_x_N"), force.x(), 0.05);  // 0.1 px
     EXPECT_NEAR(number("force_y_N"), force.y(), 0.05);
     EXPECT_NEAR(number("force_z_N"), force.z(), 0.1 * force.z());
+    EXPECT_NEAR(number("true_x_N"), force.x(), 1e-5);
+    EXPECT_NEAR(number("true_z_N"), force.z(), 1e-5);
     EXPECT_GT(number("sigma_force_x_N"), 0.0);
     EXPECT_GT(number("sigma_force_z_N"), 0.0);
     if (i == 0) {
@@ -116,6 +119,36 @@ TEST_F(TouchCommands, KnownForcesGiveAModelThatReadsOthers) {
     EXPECT_LT(std::abs(number("turn_deg")), 1.0);
     EXPECT_GT(number("highest_mm"), 0.1);
   }
+}
+
+TEST_F(TouchCommands, TablesGoIntoOneHdf5FileWithUnits) {
+  ASSERT_EQ(run_program({"estimate", "markers", in("other"), "--touch", "-o", in("out")}).exit_code, 0);
+  const auto run = run_program({"export", "tables", in("out"), "-o", in("out.h5")});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("touch (32 columns, 4 lines)"));
+  {
+    const Hdf5Reader file(folder_.path() / "out.h5");
+    const auto rows = csv_table(folder_.path() / "out/touch.csv");
+    const std::vector<double> u_px = file.read<double>("/touch/u_px").values;
+    const std::vector<std::string> slip = file.read_texts("/touch/slip");
+    ASSERT_EQ(u_px.size(), rows.size());
+    EXPECT_TRUE(std::isnan(u_px[0])) << "nothing touches";
+    EXPECT_EQ(u_px[2], std::stod(rows[2].at("u_px")));
+    EXPECT_EQ(slip[2], rows[2].at("slip"));
+    EXPECT_EQ(file.read_texts("/touch/file")[3], "3.png");
+    EXPECT_EQ(file.text_attribute("/touch/u_px", "unit"), "px");
+    EXPECT_EQ(file.text_attribute("/touch/lag", "unit"), "1");
+    EXPECT_TRUE(std::isnan(file.read<double>("/touch/true_x_N").values[1])) << "an empty column is one of numbers";
+    EXPECT_EQ(file.extents("/markers/dx_px")[0],
+              static_cast<std::int64_t>(csv_table(folder_.path() / "out/markers.csv").size()));
+  }
+  ASSERT_EQ(run_program({"export", "tables", in("out"), "-o", in("again.h5")}).exit_code, 0);
+  EXPECT_EQ(read_whole_file(folder_.path() / "again.h5"), read_whole_file(folder_.path() / "out.h5"));
+  folder_.write("odd/a.csv", "file,x/y_N\n0.png,1\n");
+  const auto odd = run_program({"export", "tables", in("odd"), "-o", in("odd.h5")});
+  EXPECT_EQ(odd.exit_code, 2);
+  EXPECT_THAT(odd.err, AllOf(HasSubstr("odd/a.csv"), HasSubstr("'x/y_N' can't be a name in HDF5")));
+  EXPECT_FALSE(std::filesystem::exists(folder_.path() / "odd.h5"));
 }
 
 TEST_F(TouchCommands, WithoutHeightsShearContactAndSlipAreRead) {

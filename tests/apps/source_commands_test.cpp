@@ -185,7 +185,7 @@ TEST_F(SourceCommand, ALiveViewShowsEachFrameWithItsMarkers) {
   const std::string url = server.url(), folder = in("out");
   const pid_t child = fork();
   if (child == 0) {
-    dup2(out[1], STDOUT_FILENO);
+    dup2(out[1], STDERR_FILENO);
     execl(TOUCHSTONE_PROGRAM, TOUCHSTONE_PROGRAM, "--quiet", "estimate", "markers", url.c_str(), "-o", folder.c_str(),
           "--live", "0", nullptr);
     _exit(127);

@@ -110,6 +110,16 @@ def test_markers_of_any_layout_are_followed(places, polarity):
     assert dark.light == "dark" and not dark.trusted.any()
 
 
+def test_a_frame_at_rest_that_was_touched_is_said():
+    pressed = NINE_BY_NINE + 6 * np.exp(-((NINE_BY_NINE - (160, 120)) ** 2).sum(axis=1) / 4000)[:, None] * (0.8, -0.6)
+    tracker = ts.MarkerTracker(dots_picture(NINE_BY_NINE))
+    assert not tracker.track(dots_picture(pressed)).rest_was_touched
+    assert not tracker.track(dots_picture(NINE_BY_NINE)).rest_was_touched
+    wrong = ts.MarkerTracker(dots_picture(pressed))
+    assert wrong.track(dots_picture(NINE_BY_NINE)).rest_was_touched
+    assert wrong.track(dots_picture(pressed)).rest_was_touched, "it stays so"
+
+
 def test_a_marker_tracker_keeps_time_and_starts_again():
     tracker = ts.MarkerTracker(dots_picture(NINE_BY_NINE))
     times = [tracker.track(dots_picture(NINE_BY_NINE), t).t_us for t in (None, None, 1000, None)]
