@@ -1,6 +1,7 @@
 #include "sim/files/image_file.h"
 
 #include <array>
+#include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <set>
 
@@ -62,6 +63,7 @@ struct Picture {
   cv::Mat pixels;
   std::vector<std::string> names;
   std::string metadata_value;
+  int orientation = 1;
 };
 
 // Without pixels if only the metadata is wanted.
@@ -77,6 +79,7 @@ Picture read_file(const fs::path& path, const std::string& key, bool with_pixels
     auto& to = *static_cast<Context*>(opaque);
     to.picture.names.assign(info->channel_names, info->channel_names + info->channels);
     to.picture.metadata_value = info->metadata_value;
+    to.picture.orientation = info->orientation;
     if (!to.with_pixels) return nullptr;
     const int depth = info->depth == kTouchstoneU8 ? CV_8U : info->depth == kTouchstoneU16 ? CV_16U : CV_32F;
     try {
@@ -93,6 +96,32 @@ Picture read_file(const fs::path& path, const std::string& key, bool with_pixels
   }
   if (context.no_memory) fail("{}: can't be read (there isn't memory enough for it)", path.string());
   return std::move(context.picture);
+}
+
+/// Turned as the camera has marked it: EXIF's orientation says what to do, 2 to 4 mirror or turn over, 5 to 8 also swap
+/// rows and columns. Others than 1 to 8 say nothing.
+cv::Mat upright(const cv::Mat& stored, int orientation) {
+  if (orientation < 2 || orientation > 8) return stored;
+  cv::Mat image;
+  if (orientation >= 5) cv::transpose(stored, image);
+  const cv::Mat& swapped = orientation >= 5 ? image : stored;
+  switch (orientation) {
+    case 2:  // mirrored
+    case 6:  // a quarter clockwise: transposed, then mirrored
+      cv::flip(swapped, image, 1);
+      break;
+    case 3:  // half a turn
+    case 7:  // transposed over the other diagonal
+      cv::flip(swapped, image, -1);
+      break;
+    case 4:  // upside down, mirrored
+    case 8:  // a quarter anticlockwise
+      cv::flip(swapped, image, 0);
+      break;
+    default:  // 5: transposed
+      break;
+  }
+  return image;
 }
 
 void refuse_bad_metadata(const fs::path& path, const ImageMetadata& metadata) {
@@ -148,8 +177,10 @@ void write_exr(const fs::path& path, const cv::Mat& image, const std::vector<std
 
 cv::Mat read_image(const fs::path& path) {
   const Picture picture = read_file(path, "", true);
-  const cv::Mat& pixels = picture.pixels;
-  if (pixels.depth() == CV_32F) fail("{}: holds floats; a picture of 8 or 16 bit is needed here", path.string());
+  if (picture.pixels.depth() == CV_32F) {
+    fail("{}: holds floats; a picture of 8 or 16 bit is needed here", path.string());
+  }
+  const cv::Mat pixels = upright(picture.pixels, picture.orientation);
   cv::Mat image;
   switch (pixels.channels()) {
     case 1:

@@ -25,7 +25,8 @@ void write_exr(const std::filesystem::path& path, const cv::Mat& image, const st
                const ImageMetadata& metadata = {});
 
 /// Reads a PNG, TIFF, JPEG or what else OpenImageIO knows, in 8 or 16 bit as it is stored: one channel (grey) or three
-/// (BGR). An alpha channel is left out. @throws Error naming the file if it can't be read, is damaged, or holds floats
+/// (BGR), turned as its EXIF orientation says. An alpha channel is left out. @throws Error naming the file if it can't
+/// be read, is damaged, or holds floats
 cv::Mat read_image(const std::filesystem::path& path);
 
 /// A picture of floats with its channels by name.

@@ -134,7 +134,8 @@ int read(const char* path, const char* key, void* (*accept)(void*, const Touchst
                                     .channels = spec.nchannels,
                                     .depth = depth,
                                     .channel_names = names.data(),
-                                    .metadata_value = value.c_str()};
+                                    .metadata_value = value.c_str(),
+                                    .orientation = spec.get_int_attribute("Orientation", 1)};
   void* const pixels = accept(context, &info);
   if (pixels == nullptr) return 0;
   if (!input->read_image(0, 0, 0, spec.nchannels, type_of(depth), pixels)) {

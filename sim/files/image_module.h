@@ -29,6 +29,7 @@ struct TouchstoneImageInfo {
   TouchstoneDepth depth;
   const char* const* channel_names;
   const char* metadata_value;  // of the key asked for; "" if there's none
+  int orientation;             // as EXIF's: 1 upright, 2 to 8 mirrored or turned; 1 where the file says nothing
 };
 
 /// The functions of the module, found by kTouchstoneImageModuleSymbol.
@@ -44,7 +45,7 @@ struct TouchstoneImageModule {
 };
 
 constexpr int kTouchstoneImageModuleVersion =
-    1;  ///< changes with any of these structs; a module of another version isn't used
+    2;  ///< changes with any of these structs; a module of another version isn't used
 constexpr const char* kTouchstoneImageModuleSymbol =
     "touchstone_image_module_table";  ///< the module's function that returns its table
 }

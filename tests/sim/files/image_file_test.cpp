@@ -302,6 +302,49 @@ TEST_F(ImageFile, CutPicturesOfEveryKindAreRefusedByName) {
   }
 }
 
+/// EXIF with nothing but an orientation, as phones and cameras write it behind a JPEG's first two bytes.
+std::string turned_jpeg(const std::string& jpeg, int orientation) {
+  std::string exif = std::string("Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0", 25);
+  exif += static_cast<char>(orientation);
+  exif += std::string(6, '\0');
+  std::string segment = "\xff\xe1";
+  segment += '\0';
+  segment += static_cast<char>(exif.size() + 2);
+  return jpeg.substr(0, 2) + segment + exif + jpeg.substr(2);
+}
+
+// The EXIF standard (CIPA DC-008, 4.6.4 A, tag 274) says where the stored picture's first row and first column belong.
+TEST_F(ImageFile, PicturesThatACameraHasMarkedAsTurnedAreTurned) {
+  const cv::Mat frame = frame_like(40, 24);
+  const std::string jpeg = render::jpeg_bytes(frame, {});
+  const fs::path file = folder_ / "turned.jpg";
+  write_whole_file(file, jpeg);
+  const cv::Mat stored = read_image(file);
+  const int last_row = stored.rows - 1, last_column = stored.cols - 1;
+  for (int orientation = 0; orientation <= 9; ++orientation) {
+    SCOPED_TRACE(orientation);
+    write_whole_file(file, turned_jpeg(jpeg, orientation));
+    const cv::Mat image = read_image(file);
+    const bool swaps = orientation >= 5 && orientation <= 8;
+    ASSERT_EQ(image.size(), swaps ? cv::Size(stored.rows, stored.cols) : stored.size());
+    for (int r = 0; r < stored.rows; ++r) {
+      for (int c = 0; c < stored.cols; ++c) {
+        cv::Point to(c, r);
+        if (orientation == 2) to = {last_column - c, r};  // first column at the right
+        if (orientation == 3)
+          to = {last_column - c, last_row - r};        // first row at the bottom, first column at the right
+        if (orientation == 4) to = {c, last_row - r};  // first row at the bottom
+        if (orientation == 5) to = {r, c};             // first row at the left, first column at the top
+        if (orientation == 6) to = {last_row - r, c};  // first row at the right, first column at the top
+        if (orientation == 7)
+          to = {last_row - r, last_column - c};           // first row at the right, first column at the bottom
+        if (orientation == 8) to = {r, last_column - c};  // first row at the left, first column at the bottom
+        ASSERT_EQ(image.at<cv::Vec3b>(to), stored.at<cv::Vec3b>(r, c));
+      }
+    }
+  }
+}
+
 TEST_F(ImageFile, AJpegDamagedInsideIsRefused) {
   const std::string whole = render::jpeg_bytes(frame_like(320, 240), {});
   const std::size_t pixels = whole.find("\xff\xda") + 14;
