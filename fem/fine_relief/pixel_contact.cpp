@@ -38,6 +38,7 @@ class Solver {
       : layer_(layer),
         grid_(layer.grid()),
         gap_(contact.gap),
+        share_(contact.share),
         forced_(contact.force.has_value()),
         pressure_sum_(forced_ ? *contact.force / grid_.pixel_area() : 0.0),
         tolerance_(tolerance),
@@ -88,13 +89,13 @@ class Solver {
     const Sums found = over_rows([&](std::size_t k, Sums& s) {
       double& p = answer_.pressure[k];
       p = gap_[k] < kInfinity ? std::max(0.0, p) : 0.0;
-      s.a += p;
-      s.count += gap_[k] < kInfinity;
-      s.lowest = std::min(s.lowest, gap_[k]);
+      s.a += share(k) * p;
+      s.b += gap_[k] < kInfinity ? share(k) : 0.0;
+      s.lowest = std::min(s.lowest, gap_[k] / share(k));
     });
     lowest_gap_ = found.lowest;
     if (forced_ && pressure_sum_ > 0.0 && !(found.a > 0.0)) {
-      const double uniform = pressure_sum_ / static_cast<double>(found.count);
+      const double uniform = pressure_sum_ / found.b;
       over_rows([&](std::size_t k, Sums&) { answer_.pressure[k] = gap_[k] < kInfinity ? uniform : 0.0; });
     } else if (forced_) {
       scale(found.a);
@@ -112,6 +113,7 @@ class Solver {
   }
 
   double raw_gap(std::size_t k) const { return gap_[k] + answer_.displacement[k]; }
+  double share(std::size_t k) const { return share_.empty() ? 1.0 : share_[k]; }
 
   /// Sets the shift, how well the laws of contact are met, and which pixels take part in the next step: those with
   /// pressure, and those that overlap without. Returns how many there are.
@@ -120,18 +122,18 @@ class Solver {
     if (forced_) {
       const Sums mean = over_rows([&](std::size_t k, Sums& s) {
         if (answer_.pressure[k] > 0.0) {
-          s.a += raw_gap(k);
-          ++s.count;
+          s.a += share(k) * raw_gap(k);
+          s.b += share(k) * share(k);
         }
       });
-      if (mean.count > 0) answer_.shift = -mean.a / static_cast<double>(mean.count);
+      if (mean.b > 0.0) answer_.shift = -mean.a / mean.b;
     }
     const double shift = answer_.shift;
     const Sums state = over_rows([&](std::size_t k, Sums& s) {
       residual_[k] = 0.0;
       takes_part_[k] = 0;
       if (!(gap_[k] < kInfinity)) return;
-      const double g = raw_gap(k) + shift;
+      const double g = raw_gap(k) + share(k) * shift;
       if (answer_.pressure[k] > 0.0) {
         s.highest = std::max(s.highest, std::abs(g));
         ++s.count;
@@ -149,19 +151,20 @@ class Solver {
     return state.count + static_cast<std::size_t>(state.a);
   }
 
-  /// Takes from the pixels that take part their mean, if the force is given, and makes the others zero.
+  /// Takes from the pixels that take part what changes the force, if that is given (their mean, where all shares are
+  /// one), and makes the others zero.
   void project(std::vector<double>& values) {
     double mean = 0.0;
     if (forced_) {
       const Sums sum = over_rows([&](std::size_t k, Sums& s) {
         if (takes_part_[k]) {
-          s.a += values[k];
-          ++s.count;
+          s.a += share(k) * values[k];
+          s.b += share(k) * share(k);
         }
       });
-      mean = sum.count > 0 ? sum.a / static_cast<double>(sum.count) : 0.0;
+      mean = sum.b > 0.0 ? sum.a / sum.b : 0.0;
     }
-    over_rows([&](std::size_t k, Sums&) { values[k] = takes_part_[k] ? values[k] - mean : 0.0; });
+    over_rows([&](std::size_t k, Sums&) { values[k] = takes_part_[k] ? values[k] - share(k) * mean : 0.0; });
   }
 
   /// One step along the conjugate direction (Polak and Ribiere's [Polak1969], which begins anew by itself where the set
@@ -195,7 +198,7 @@ class Solver {
         s.count += next < 0.0;
         p[k] = std::max(0.0, next);
       }
-      s.a += p[k];
+      s.a += share(k) * p[k];
     });
     if (forced_ && !(after.a > 0.0)) {
       last_square_ = 0.0;
@@ -216,7 +219,7 @@ class Solver {
   }
 
   void finish() {
-    const Sums sum = over_rows([&](std::size_t k, Sums& s) { s.a += answer_.pressure[k]; });
+    const Sums sum = over_rows([&](std::size_t k, Sums& s) { s.a += share(k) * answer_.pressure[k]; });
     answer_.force = sum.a * grid_.pixel_area();
     if (!forced_) return;
     answer_.force_residual = std::abs(answer_.force - pressure_sum_ * grid_.pixel_area());
@@ -229,7 +232,7 @@ class Solver {
 
   const LayerResponse& layer_;
   const PixelGrid grid_;
-  std::span<const double> gap_;
+  std::span<const double> gap_, share_;
   bool forced_;
   double pressure_sum_;  // over the pixels, MPa
   PixelTolerance tolerance_;
@@ -247,7 +250,7 @@ class Solver {
 
 namespace {
 
-/// Four pixels in one: the mean gap of those with a body over them.
+/// Four pixels in one: the mean of the values below infinity.
 std::vector<double> halved(const PixelGrid& fine, const PixelGrid& coarse, std::span<const double> gap) {
   std::vector<double> result(coarse.size(), kInfinity);
   for (int j = 0; j < coarse.ny; ++j) {
@@ -295,9 +298,10 @@ std::vector<double> nested_start(const LayerResponse& layer, const PixelContact&
   const LayerResponse& wide = layer.on_wider_pixels();
   const PixelGrid& coarse = wide.grid();
   const std::vector<double> gap = halved(fine, coarse, contact.gap);
+  const std::vector<double> share = contact.share.empty() ? std::vector<double>() : halved(fine, coarse, contact.share);
   PixelTolerance loose = tolerance;
   loose.gap_mm *= kNestedLooseness;
-  return doubled(coarse, fine, solve_pixel_contact(wide, {gap, contact.force}, loose).pressure);
+  return doubled(coarse, fine, solve_pixel_contact(wide, {gap, contact.force, share}, loose).pressure);
 }
 
 }  // namespace
@@ -306,12 +310,16 @@ PixelContactAnswer solve_pixel_contact(const LayerResponse& layer, const PixelCo
                                        const PixelTolerance& tolerance, std::span<const double> start) {
   const std::size_t n = layer.grid().size();
   TS_ASSERT(contact.gap.size() == n && (start.empty() || start.size() == n));
+  TS_ASSERT(contact.share.empty() || contact.share.size() == n);
   bool body = false;
   for (std::size_t k = 0; k < n; ++k) {
     if (std::isnan(contact.gap[k]) || contact.gap[k] == -kInfinity) {
       fail("the gap at pixel {} is {}; it must be a number or infinity", k, contact.gap[k]);
     }
     body = body || contact.gap[k] < kInfinity;
+    if (!contact.share.empty() && !(contact.share[k] > 0.0 && contact.share[k] < kInfinity)) {
+      fail("the share at pixel {} is {}; it must be above 0 and finite", k, contact.share[k]);
+    }
     if (!start.empty() && !std::isfinite(start[k])) fail("the pressure to begin with at pixel {} is {}", k, start[k]);
   }
   if (contact.force) {

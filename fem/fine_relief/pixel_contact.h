@@ -13,6 +13,8 @@ namespace touchstone::fem {
 struct PixelContact {
   std::span<const double> gap;  ///< mm per pixel, from the undeformed face up to the body; infinity: no body there
   std::optional<double> force;
+  /// By pixel, above 0: how far the gap opens, and how much the force does, when the body moves by one mm. Empty: 1.
+  std::span<const double> share = {};
 };
 
 /// When the answer is good enough.
@@ -21,7 +23,7 @@ struct PixelTolerance {
   int most_iterations = 1000;
 };
 
-/// Pressure p >= 0 and gap g >= 0, not both above zero anywhere: g = gap + shift + displacement.
+/// Pressure p >= 0 and gap g >= 0, not both above zero anywhere: g = gap + share * shift + displacement.
 struct PixelContactAnswer {
   std::vector<double> pressure;      ///< MPa
   std::vector<double> displacement;  ///< mm, into the layer
@@ -41,8 +43,8 @@ struct PixelContactAnswer {
 /// step before they have pressure [Vollebregt2014]. `start` may hold a pressure to begin with (one a pixel, e.g. the
 /// answer of the frame before); where it is empty, free grids begin with the answer on pixels of twice the width, and
 /// that so on. The same input gives the same bytes.
-/// @throws Error for NaN in the gap or the start, a gap of minus infinity, a force that isn't finite or is below zero,
-/// and a force above zero where no pixel has a body over it
+/// @throws Error for NaN in the gap or the start, a share that isn't above zero and finite, a gap of minus infinity, a
+/// force that isn't finite or is below zero, and a force above zero where no pixel has a body over it
 PixelContactAnswer solve_pixel_contact(const LayerResponse& layer, const PixelContact& contact,
                                        const PixelTolerance& tolerance = {}, std::span<const double> start = {});
 

@@ -17,7 +17,8 @@ bool is_worthwhile(const PixelGrid& part, const PixelGrid& whole) {
 bool overlaps(const PixelContact& contact, const PixelContactAnswer& answer, double gap_mm) {
   for (std::size_t k = 0; k < answer.pressure.size(); ++k) {
     if (answer.pressure[k] > 0.0) continue;
-    if (contact.gap[k] + answer.displacement[k] + answer.shift < -gap_mm) return true;
+    const double share = contact.share.empty() ? 1.0 : contact.share[k];
+    if (contact.gap[k] + answer.displacement[k] + share * answer.shift < -gap_mm) return true;
   }
   return false;
 }
@@ -38,8 +39,11 @@ PixelContactAnswer solve_in_part(const ResponseOf& response, const PixelBox& who
     // A force wants a body to rest on.
     if (std::none_of(gap.begin(), gap.end(), [](double g) { return g < std::numeric_limits<double>::infinity(); }))
       break;
+    const std::vector<double> share = contact.share.empty()
+                                          ? std::vector<double>()
+                                          : on_grid(grid, {contact.share.begin(), contact.share.end()}, small, 1.0);
     const std::vector<double> begin = pressure.empty() ? pressure : on_grid(grid, pressure, small, 0.0);
-    PixelContactAnswer answer = solve_pixel_contact(*response(small), {gap, contact.force}, tolerance, begin);
+    PixelContactAnswer answer = solve_pixel_contact(*response(small), {gap, contact.force, share}, tolerance, begin);
     pressure = on_grid(small, answer.pressure, grid, 0.0);
     if (const PixelBox wider = common(widened(part, small, answer.pressure), whole); !(wider == part)) {
       part = of_kept_size(wider, whole);

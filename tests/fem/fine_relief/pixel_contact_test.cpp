@@ -182,6 +182,33 @@ TEST(PixelContact, TheLawsOfContactHold) {
   EXPECT_GT(answer.pixels_in_contact, 100);
 }
 
+TEST(PixelContact, SharesWeighTheForceAndTheMotion) {
+  const PixelGrid grid = centred(80, 70, 0.02);
+  const LayerResponse layer(kGel, 1.0, grid, GridEdges::free);
+  const auto gap = gap_of(grid, [](const Eigen::Vector2d& x) { return x.squaredNorm() / 6.0; });
+  const auto share = gap_of(grid, [](const Eigen::Vector2d& x) { return 0.7 + 0.4 * x.x() - 0.2 * x.y(); });
+  const auto answer = solve_pixel_contact(layer, {gap, 0.03, share}, {1e-8, 2000});
+  ASSERT_TRUE(answer.converged);
+  double force = 0.0;
+  for (std::size_t k = 0; k < gap.size(); ++k) {
+    const double g = gap[k] + answer.displacement[k] + share[k] * answer.shift;
+    EXPECT_GE(g, -1.01e-8);
+    if (answer.pressure[k] > 0.0) {
+      EXPECT_LE(g, 1.01e-8);
+    }
+    force += share[k] * answer.pressure[k] * grid.pixel_area();
+  }
+  EXPECT_NEAR(force, 0.03, 1e-12);
+  EXPECT_NEAR(answer.force, 0.03, 1e-12);
+  EXPECT_GT(answer.pixels_in_contact, 100);
+  // Ones change nothing.
+  const std::vector<double> ones(grid.size(), 1.0);
+  EXPECT_EQ(solve_pixel_contact(layer, {gap, 0.03, ones}).pressure, solve_pixel_contact(layer, {gap, 0.03}).pressure);
+  std::vector<double> none = ones;
+  none[7] = 0.0;
+  EXPECT_THROW(solve_pixel_contact(layer, {gap, 0.03, none}), Error);
+}
+
 TEST(PixelContact, MovingTheBodyByAPixelMovesTheAnswer) {
   const PixelGrid grid = centred(64, 64, 0.02);
   const LayerResponse layer(kGel, 1.0, grid, GridEdges::free);
