@@ -102,8 +102,8 @@ struct PressState {
   std::shared_ptr<const CutHats> cuts;  ///< how they are cut; null: all are whole
   std::vector<NodeState> node_state;    ///< n
   std::vector<int> node_owner;          ///< n, the body that a vertex touches, -1 where open
-  Eigen::VectorXd object_gives;  ///< n, mm, means over hats: how far an elastic body's surface has given way along z;
-                                 ///< NaN where none touches; empty: all are rigid, or the gel relaxes
+  Eigen::VectorXd object_gives;  ///< n, mm, means over hats: how far an elastic body's surface has given way along
+                                 ///< the gel's normal; NaN where none touches; empty: all are rigid, or the gel relaxes
 
   double largest_penetration = 0.0;  ///< mm, weighted gap over weight
   double largest_tension = 0.0;      ///< MPa

@@ -101,7 +101,8 @@ PressState report(const Compliance& gel, const PartSolver& solver, const Surface
     s.largest_tension = std::max(s.largest_tension, -pressure);
     const double area = surface.weight[v] * snapshot.share[v];
     if (s.object_gives.size() > 0 && soft(solver.bodies()[snapshot.owner[v]])) {
-      s.object_gives[v] = (snapshot.weighted[3 * v + 2] - snapshot.relative[3 * v + 2]) / area;
+      s.object_gives[v] =
+          surface.normals[v].dot(snapshot.weighted.segment<3>(3 * v) - snapshot.relative.segment<3>(3 * v)) / area;
     }
     s.contact_area += area;
     ++s.contact_vertices;

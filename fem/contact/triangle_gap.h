@@ -18,6 +18,16 @@
 
 namespace touchstone::fem {
 
+/// first_entry(), but nothing for a body that lies wholly farther behind the point than `farthest_behind` (mm).
+template <typename Shape>
+std::optional<double> entry_before(const Shape& shape, const Eigen::Vector3d& point, const Eigen::Vector3d& normal,
+                                   double farthest_behind) {
+  const auto found = first_entry(shape, point, normal);
+  if (!found || *found >= -farthest_behind) return found;
+  const auto back = first_entry(shape, point, -normal);  // where the line leaves the body, seen from outside
+  return back && -*back < -farthest_behind ? std::nullopt : found;
+}
+
 /// Integrates over one surface triangle; coordinates inside it are barycentric.
 template <typename Shape>
 class TriangleGap {
@@ -157,10 +167,7 @@ class TriangleGap {
     return one_normal_ ? Eigen::Vector3d(normals_.col(0)) : (normals_ * b).normalized();
   }
   std::optional<double> entry(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
-    const auto found = first_entry(shape_, point, normal);
-    if (!found || *found >= -farthest_behind_) return found;
-    const auto back = first_entry(shape_, point, -normal);  // where the line leaves the body, seen from outside
-    return back && -*back < -farthest_behind_ ? std::nullopt : found;
+    return entry_before(shape_, point, normal, farthest_behind_);
   }
   std::optional<double> gap_along(const Eigen::Vector3d& b) const {
     auto found = entry(points_ * b, direction(b));

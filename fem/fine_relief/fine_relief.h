@@ -18,13 +18,15 @@
 
 namespace touchstone::fem {
 
-/// What is kept of the coarse press: its force (the object gives way along z by ReliefAnswer::shift), or its pose (the
-/// force becomes another: for an object that the coarse mesh can't see, such as a lone hair).
+/// What is kept of the coarse press: its force along ReliefAnswer::direction (the object gives way along that by
+/// ReliefAnswer::solved.shift), or its pose (the force becomes another: for an object that the coarse mesh can't see,
+/// such as a lone hair).
 enum class ReliefControl { force, pose };
 
 /// How finely the relief is resolved, where it is looked up, and to what tolerance contact is solved.
 struct ReliefSettings {
-  double pitch = 0.02;  ///< mm, of pixels: a third of the finest detail
+  double pitch = 0.02;  ///< mm, of pixels: a third of the finest detail. On a dome's flank they are smaller, by
+                        ///< SurfacePlace::scale
   /// mm of surface round the coarse contact that the grid begins with; below 0: two edges of the mesh or a quarter of
   /// the thickness, the larger. It is widened where the fine contact reaches its border.
   double margin = -1.0;
@@ -39,22 +41,28 @@ struct ReliefSettings {
   std::optional<ElasticMaterial> object = {};
 };
 
-/// The surface under the fine contact, of the gel. Pixels stand on the undeformed surface (gel frame, z = 0, or on the
-/// dome); the one at x has moved to x + tangential + (0, 0, height).
+/// The surface under the fine contact, of the gel. Pixels stand where SmoothSurface::place has them; that at x has
+/// moved to x + tangential + height * normal.
 struct ReliefAnswer {
-  PixelGrid grid;                ///< empty (0 x 0) out of contact
+  PixelGrid grid;                ///< as the surface is laid out; empty (0 x 0) out of contact
   std::vector<double> pressure;  ///< MPa, of the object on the gel
   std::vector<double> height;    ///< mm, normal displacement: below 0 under the object
   std::vector<char> contact;     ///< 1: in contact
-  SplineField along;             ///< components x and y: the tangential displacement, mm
+  SplineField along;             ///< the tangential displacement, mm, gel frame
   SplineField rest;              ///< as SmoothDisplacement::rest
   std::vector<double> layer;     ///< as SmoothDisplacement::layer
   PixelContactAnswer solved;     ///< shift, residuals, work; its pressure and displacement are moved into the above
-  double coarse_force = 0.0;     ///< N
-  double misfit = 0.0;           ///< mm, see SmoothDisplacement::largest_misfit
-  bool at_the_edge = false;      ///< contact reaches the surface's own edge, where the layer isn't endless
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  ///< as SmoothDisplacement::direction
+  double coarse_force = 0.0;                             ///< N
+  double misfit = 0.0;                                   ///< mm, see SmoothDisplacement::largest_misfit
+  bool at_the_edge = false;  ///< contact reaches the surface's own edge, where the layer isn't endless
 
-  Eigen::Vector2d tangential(const Eigen::Vector2d& point) const { return along.at(point).head<2>(); }
+  Eigen::Vector3d tangential(const Eigen::Vector2d& laid_out) const { return along.at(laid_out); }
+  /// Where the object stands that `press` has at a pose: moved out of the gel by what the force wants.
+  RigidTransform moved(RigidTransform gel_from_object) const {
+    gel_from_object.translation += solved.shift * direction;
+    return gel_from_object;
+  }
 };
 
 /// Solves the fine contact of `shape`, in all its detail, as `press` has it placed. A pure function of its arguments;
@@ -65,16 +73,16 @@ ReliefAnswer solve_fine_relief(const SmoothSurface& surface, const PressState& p
                                const ReliefSettings& settings = {}, const ReliefAnswer* previous = nullptr);
 
 /// The displaced surface's height (mm) over the undeformed one, along z, at points of the gel frame's x, y plane, as a
-/// camera or a profilometer above it would find it: where the tangential displacement has carried the gel. Outside of
-/// the answer's grid: the coarse one.
+/// camera or a profilometer above it would find it: where the displacement has carried the gel. Where it hangs over
+/// itself, as on a steep flank beside a deep contact, one of its heights. Outside of the answer's grid: the coarse one.
 class HeightField {
  public:
   /// `fine` may be null: coarse heights everywhere. The surface must outlive this.
   HeightField(const SmoothSurface& surface, const PressState& press, const ReliefAnswer* fine);
 
-  /// The height over a place that a camera sees.
-  double at(const Eigen::Vector2d& point) const;
-  /// How far the material point that stood at `material` on the undeformed surface has moved along z.
+  /// The height over a place that a camera sees; beside a dome that of its rim.
+  double at(const Eigen::Vector2d& seen) const;
+  /// How far the material point whose place is laid out at `material` has moved along the undeformed surface's normal.
   double at_material(const Eigen::Vector2d& material) const;
 
  private:

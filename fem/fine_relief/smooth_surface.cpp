@@ -13,7 +13,7 @@
 namespace touchstone::fem {
 namespace {
 
-constexpr double kFlatness = 1e-9;  // of the surface's width
+constexpr double kFlatness = 1e-9;  // of the surface's width, off the plane or the sphere
 constexpr double kPixelsAnEdge = 8.0;
 constexpr int kMostReferencePixels = 768;  // a side
 constexpr int kMostWidenings = 2;          // of reference pixels, for a difference of pressures seen from afar
@@ -28,11 +28,11 @@ struct Box {
   Eigen::Vector2d high = -low;
 };
 
-Box box_of(const std::vector<Eigen::Vector3d>& vertices) {
+Box box_of(const std::vector<Eigen::Vector2d>& vertices) {
   Box box;
   for (const auto& v : vertices) {
-    box.low = box.low.cwiseMin(v.head<2>());
-    box.high = box.high.cwiseMax(v.head<2>());
+    box.low = box.low.cwiseMin(v);
+    box.high = box.high.cwiseMax(v);
   }
   return box;
 }
@@ -49,12 +49,14 @@ double shortest_edge(const Compliance& gel) {
 }
 
 /// The P1 functions at the pixels' centres. A centre on an edge belongs to one triangle.
-Eigen::SparseMatrix<double, Eigen::RowMajor> sampled_hats(const Compliance& gel, const PixelGrid& grid) {
+Eigen::SparseMatrix<double, Eigen::RowMajor> sampled_hats(const std::vector<std::array<int, 3>>& triangles,
+                                                          const std::vector<Eigen::Vector2d>& vertices,
+                                                          const PixelGrid& grid) {
   std::vector<char> taken(grid.size(), 0);
   std::vector<Eigen::Triplet<double>> entries;
-  for (const auto& t : gel.triangles) {
+  for (const auto& t : triangles) {
     std::array<Eigen::Vector2d, 3> c;
-    for (int k = 0; k < 3; ++k) c[k] = (gel.vertices[t[k]].head<2>() - grid.first) / grid.pitch;
+    for (int k = 0; k < 3; ++k) c[k] = (vertices[t[k]] - grid.first) / grid.pitch;
     const auto low = c[0].cwiseMin(c[1]).cwiseMin(c[2]);
     const auto high = c[0].cwiseMax(c[1]).cwiseMax(c[2]);
     const Eigen::Vector2d e1 = c[1] - c[0];
@@ -77,7 +79,7 @@ Eigen::SparseMatrix<double, Eigen::RowMajor> sampled_hats(const Compliance& gel,
     }
   }
   Eigen::SparseMatrix<double, Eigen::RowMajor> hats(static_cast<Eigen::Index>(grid.size()),
-                                                    static_cast<Eigen::Index>(gel.vertices.size()));
+                                                    static_cast<Eigen::Index>(vertices.size()));
   hats.setFromTriplets(entries.begin(), entries.end());
   return hats;
 }
@@ -145,32 +147,38 @@ SmoothSurface::SmoothSurface(const Compliance& gel, double sphere_radius)
       edge_(shortest_edge(gel)),
       sphere_radius_(sphere_radius),
       rim_radius_(std::numeric_limits<double>::infinity()) {
-  const Box box = box_of(gel.vertices);
-  const Eigen::Vector2d size = box.high - box.low;
-  const auto n = static_cast<Eigen::Index>(gel.vertices.size());
-  per_seen_area_ = Eigen::VectorXd::Ones(n);
   double widest = 0.0;
   for (const auto& v : gel.vertices) widest = std::max(widest, v.head<2>().norm());
-  if (std::isfinite(sphere_radius)) {
-    if (!(widest <= std::sin(kSteepestDome) * sphere_radius)) {
-      fail(
-          "fine relief and smooth surfaces are for flat and gently domed gels only: a cap of {:.4g} mm radius on a "
-          "sphere of {:.4g} mm slopes by {:.3g} degrees at its rim, allowed are {:.3g}",
-          widest, sphere_radius, std::asin(std::min(1.0, widest / sphere_radius)) / kRadiansPerDegree,
-          kSteepestDome / kRadiansPerDegree);
-    }
-    rim_radius_ = widest;
+  if (!is_flat() && !(widest <= std::sin(kSteepestDome) * sphere_radius)) {
+    fail(
+        "fine relief and smooth surfaces are for flat and domed gels only: a cap of {:.4g} mm radius on a sphere of "
+        "{:.4g} mm slopes by {:.3g} degrees at its rim, allowed are {:.3g}",
+        widest, sphere_radius, std::asin(std::min(1.0, widest / sphere_radius)) / kRadiansPerDegree,
+        kSteepestDome / kRadiansPerDegree);
   }
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const Eigen::Vector3d& v = gel.vertices[static_cast<std::size_t>(i)];
-    if (std::abs(v.z() - rest_height(v.head<2>())) > kFlatness * size.maxCoeff()) {
+  const Eigen::Vector3d middle(0.0, 0.0, -sphere_radius);
+  for (const Eigen::Vector3d& v : gel.vertices) {
+    const double off = is_flat() ? v.z() : (v - middle).norm() - sphere_radius;
+    if (std::abs(off) > kFlatness * widest || (!is_flat() && v.z() < -sphere_radius)) {
       fail(
-          "fine relief and smooth surfaces are for flat and gently domed gels only: the outer surface of this one "
-          "reaches to z = {:.4g} mm",
-          v.z());
+          "fine relief and smooth surfaces are for flat and domed gels only: the outer surface of this one reaches to "
+          "({:.4g}, {:.4g}, {:.4g}) mm",
+          v.x(), v.y(), v.z());
     }
-    if (std::isfinite(sphere_radius)) per_seen_area_[i] = sphere_radius / (sphere_radius + v.z());
+    if (is_flat()) {
+      vertices_.push_back(v.head<2>());
+      normals_.push_back(Eigen::Vector3d::UnitZ());
+    } else {
+      vertices_.push_back(v.head<2>() / (1.0 + 0.5 * v.z() / sphere_radius));
+      normals_.push_back((v - middle) / sphere_radius);
+    }
   }
+  if (!is_flat()) {
+    rim_radius_ = 0.0;
+    for (const auto& v : vertices_) rim_radius_ = std::max(rim_radius_, v.norm());
+  }
+  const Box box = box_of(vertices_);
+  const Eigen::Vector2d size = box.high - box.low;
   const double pitch = std::max({edge_ / kPixelsAnEdge, size.maxCoeff() / kMostReferencePixels});
   PixelGrid grid;
   grid.nx = static_cast<int>(std::ceil(size.x() / pitch - 1e-9));
@@ -178,60 +186,110 @@ SmoothSurface::SmoothSurface(const Compliance& gel, double sphere_radius)
   grid.pitch = pitch;
   grid.first = 0.5 * (box.low + box.high) - 0.5 * pitch * Eigen::Vector2d(grid.nx - 1, grid.ny - 1);
   layer_ = std::make_unique<LayerResponse>(gel.material, gel.thickness, grid, GridEdges::free);
-  hats_ = sampled_hats(gel, grid);
+  scales_ = scales(grid);
+  hats_ = sampled_hats(gel.triangles, vertices_, grid);
+  const Eigen::Map<const Eigen::VectorXd> scale(scales_.data(), static_cast<Eigen::Index>(scales_.size()));
+  areas_ = scale.cwiseAbs2().asDiagonal() * hats_;
   weight_ = gel.mass * Eigen::VectorXd::Ones(gel.mass.cols());
-  pixel_weight_ = grid.pixel_area() * (hats_.transpose() * Eigen::VectorXd::Ones(hats_.rows()));
+  pixel_weight_ = grid.pixel_area() * (areas_.transpose() * Eigen::VectorXd::Ones(areas_.rows()));
   for (Eigen::Index v = 0; v < pixel_weight_.size(); ++v) {
     if (!(pixel_weight_[v] > 0.0)) pixel_weight_[v] = grid.pixel_area();  // a sliver between the pixels' centres
   }
 
   const double knots = std::max(gel.thickness / kKnotsAThickness, kEdgesAKnot * edge_);
-  rest_fit_ = std::make_unique<SplineFit>(grid, hats_, weight_, box.low, box.high, knots, kKnotsAWave * knots);
-  along_fit_ = std::make_unique<SplineFit>(grid, hats_, weight_, box.low, box.high, kEdgesAKnotAlong * edge_,
+  rest_fit_ = std::make_unique<SplineFit>(grid, areas_, weight_, box.low, box.high, knots, kKnotsAWave * knots);
+  along_fit_ = std::make_unique<SplineFit>(grid, areas_, weight_, box.low, box.high, kEdgesAKnotAlong * edge_,
                                            kEdgesAWaveAlong * edge_);
 }
 
 SmoothSurface::~SmoothSurface() = default;
 
-double SmoothSurface::rest_height(const Eigen::Vector2d& point) const {
-  if (std::isinf(sphere_radius_)) return 0.0;
-  const double r2 = std::min(point.squaredNorm(), rim_radius_ * rim_radius_);
+bool SmoothSurface::is_flat() const {
+  return std::isinf(sphere_radius_);
+}
+
+SurfacePlace SmoothSurface::place(const Eigen::Vector2d& laid_out) const {
+  if (is_flat()) return {{laid_out.x(), laid_out.y(), 0.0}, Eigen::Vector3d::UnitZ(), 1.0};
+  const double r2 = laid_out.squaredNorm();
+  const double scale = 1.0 / (1.0 + 0.25 * r2 / (sphere_radius_ * sphere_radius_));
+  const Eigen::Vector2d seen = scale * laid_out;
+  const double z = -0.5 * scale * r2 / sphere_radius_;
+  return {
+      {seen.x(), seen.y(), z}, {seen.x() / sphere_radius_, seen.y() / sphere_radius_, 1.0 + z / sphere_radius_}, scale};
+}
+
+Eigen::Vector2d SmoothSurface::laid_out(const Eigen::Vector2d& seen) const {
+  if (is_flat()) return seen;
+  const Eigen::Vector2d at = seen / (1.0 + 0.5 * rest_height(seen) / sphere_radius_);
+  const double r = at.norm();
+  return r > rim_radius_ ? Eigen::Vector2d(at * (rim_radius_ / r)) : at;
+}
+
+double SmoothSurface::rest_height(const Eigen::Vector2d& seen) const {
+  if (is_flat()) return 0.0;
+  const double rim = rim_radius_ / (1.0 + 0.25 * rim_radius_ * rim_radius_ / (sphere_radius_ * sphere_radius_));
+  const double r2 = std::min(seen.squaredNorm(), rim * rim);
   return -r2 / (sphere_radius_ + std::sqrt(sphere_radius_ * sphere_radius_ - r2));
 }
 
-std::vector<double> SmoothSurface::coarse_pressure(const PressState& press) const {
-  const Eigen::VectorXd pressure = hats_ * (-press.traction.col(2).cwiseProduct(per_seen_area_));
-  return {pressure.data(), pressure.data() + pressure.size()};
+std::vector<double> SmoothSurface::scales(const PixelGrid& grid) const {
+  std::vector<double> scales(grid.size(), 1.0);
+  if (is_flat()) return scales;
+  for (int j = 0; j < grid.ny; ++j) {
+    for (int i = 0; i < grid.nx; ++i) scales[grid.at(i, j)] = place(grid.centre(i, j)).scale;
+  }
+  return scales;
 }
 
-std::vector<double> SmoothSurface::layer_answer(std::span<const double> pressure) const {
-  std::vector<double> answer(reference_grid().size());
-  layer_->apply(pressure, answer, *layer_->make_scratch());
+std::vector<double> SmoothSurface::load(std::span<const double> pressure, std::span<const double> scales) {
+  std::vector<double> load(pressure.size());
+  for (std::size_t k = 0; k < load.size(); ++k) load[k] = pressure[k] * scales[k] * std::sqrt(scales[k]);
+  return load;
+}
+
+std::vector<double> SmoothSurface::coarse_load(const PressState& press) const {
+  Eigen::VectorXd pressures(static_cast<Eigen::Index>(normals_.size()));
+  for (std::size_t v = 0; v < normals_.size(); ++v) pressures[static_cast<Eigen::Index>(v)] = pressure(press, v);
+  const Eigen::VectorXd at_pixels = hats_ * pressures;
+  return load({at_pixels.data(), static_cast<std::size_t>(at_pixels.size())}, scales_);
+}
+
+std::vector<double> SmoothSurface::answer_of(const LayerResponse& layer, std::span<const double> load) const {
+  std::vector<double> answer(load.size());
+  layer.apply(load, answer, *layer.make_scratch());
+  for (std::size_t k = 0; k < answer.size(); ++k) answer[k] /= std::sqrt(scales_[k]);
   return answer;
+}
+
+Eigen::VectorXd SmoothSurface::hat_means(std::span<const double> values) const {
+  const Eigen::Map<const Eigen::VectorXd> at_pixels(values.data(), static_cast<Eigen::Index>(values.size()));
+  return reference_grid().pixel_area() * (areas_.transpose() * at_pixels).cwiseQuotient(pixel_weight_);
 }
 
 SmoothDisplacement SmoothSurface::displacement(const PressState& press) const {
   SmoothDisplacement result;
-  result.layer = layer_answer(coarse_pressure(press));
-  const std::vector<double>& layer = result.layer;
-  const Eigen::Map<const Eigen::VectorXd> into(layer.data(), static_cast<Eigen::Index>(layer.size()));
+  result.layer = answer_of(*layer_, coarse_load(press));
   Eigen::MatrixX3d means = gel_.mass * press.surface_displacement;
   means = weight_.cwiseInverse().asDiagonal() * means;
-  const Eigen::VectorXd layer_means =
-      reference_grid().pixel_area() * (hats_.transpose() * into).cwiseQuotient(pixel_weight_);
-  means.col(2) += layer_means;
-
-  Eigen::MatrixX3d part = means;
-  part.col(2).setZero();
-  result.along = along_fit_->fit(part);
-  part.setZero();
-  part.col(2) = means.col(2);
-  result.rest = rest_fit_->fit(part);
-  const Eigen::VectorXd misfit = rest_fit_->means_of(result.rest).col(2) - means.col(2);
+  Eigen::VectorXd normal_means = hat_means(result.layer);
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();
+  for (std::size_t v = 0; v < normals_.size(); ++v) {
+    const auto row = static_cast<Eigen::Index>(v);
+    const double into = normals_[v].dot(means.row(row));
+    normal_means[row] += into;
+    means.row(row) -= into * normals_[v].transpose();
+    force += weight_[row] * pressure(press, v) * normals_[v];
+  }
+  result.force = force.norm();
+  if (result.force > 0.0) result.direction = force / result.force;
+  result.along = along_fit_->fit(means);
+  means.setZero();
+  means.col(2) = normal_means;
+  result.rest = rest_fit_->fit(means);
+  const Eigen::VectorXd misfit = rest_fit_->means_of(result.rest).col(2) - normal_means;
   for (Eigen::Index v = 0; v < misfit.size(); ++v) {
     if (press.traction(v, 2) != 0.0) result.largest_misfit = std::max(result.largest_misfit, std::abs(misfit[v]));
   }
-  result.force = -weight_.dot(press.traction.col(2));
   return result;
 }
 
@@ -254,12 +312,12 @@ std::vector<double> SmoothSurface::normal_displacement(const PressState& press, 
   for (int k = 0; k < kMostWidenings && 2.0 * wide->grid().pitch <= kWidestPixel * wide->thickness(); ++k) {
     wide = &wide->on_wider_pixels();
   }
-  std::vector<double> difference = gathered(fine, pressure, wide->grid());
-  const std::vector<double> coarse = gathered(reference_grid(), coarse_pressure(press), wide->grid());
+  std::vector<double> difference = gathered(fine, load(pressure, scales(fine)), wide->grid());
+  const std::vector<double> coarse = gathered(reference_grid(), coarse_load(press), wide->grid());
   for (std::size_t k = 0; k < difference.size(); ++k) difference[k] -= coarse[k];
   wide->apply(difference, difference, *wide->make_scratch());
   std::vector<double> answer = spread_out(wide->grid(), difference, reference_grid());
-  for (std::size_t k = 0; k < answer.size(); ++k) answer[k] += layer[k];
+  for (std::size_t k = 0; k < answer.size(); ++k) answer[k] = answer[k] / std::sqrt(scales_[k]) + layer[k];
   return less_layer(rest, std::move(answer));
 }
 
@@ -267,17 +325,15 @@ QuadraticField SmoothSurface::object_rest(const PressState& press, double opposi
                                           std::span<const double> layer) const {
   const PixelGrid& grid = reference_grid();
   const std::shared_ptr<const LayerResponse> both = response(grid.nx, grid.ny, grid.pitch, opposite);
-  std::vector<double> answer(grid.size());
-  both->apply(coarse_pressure(press), answer, *both->make_scratch());
+  std::vector<double> answer = answer_of(*both, coarse_load(press));
   for (std::size_t k = 0; k < answer.size(); ++k) answer[k] -= layer[k];
-  const Eigen::Map<const Eigen::VectorXd> half_space(answer.data(), static_cast<Eigen::Index>(answer.size()));
-  const Eigen::VectorXd means = grid.pixel_area() * (hats_.transpose() * half_space).cwiseQuotient(pixel_weight_);
+  const Eigen::VectorXd means = hat_means(answer);
   std::vector<Eigen::Index> known;
   QuadraticField rest;
   for (Eigen::Index v = 0; v < press.object_gives.size(); ++v) {
     if (std::isnan(press.object_gives[v])) continue;
     known.push_back(v);
-    rest.middle += gel_.vertices[static_cast<std::size_t>(v)].head<2>();
+    rest.middle += vertices_[static_cast<std::size_t>(v)];
   }
   if (known.empty()) return rest;
   rest.middle /= static_cast<double>(known.size());
@@ -286,7 +342,7 @@ QuadraticField SmoothSurface::object_rest(const PressState& press, double opposi
   for (Eigen::Index k = 0; k < values.size(); ++k) {
     const Eigen::Index v = known[static_cast<std::size_t>(k)];
     const double root = std::sqrt(weight_[v]);
-    terms.row(k) = root * QuadraticField::terms(gel_.vertices[static_cast<std::size_t>(v)].head<2>() - rest.middle);
+    terms.row(k) = root * QuadraticField::terms(vertices_[static_cast<std::size_t>(v)] - rest.middle);
     values[k] = root * (press.object_gives[v] - means[v]);
   }
   // Of a few vertices, or of those in one line, the smallest one that there is.

@@ -289,7 +289,9 @@ PressState FinitePress::Parts::report(const FiniteSnapshot& at) const {
       const int owner = s.node_owner[v] = at.owner[v];
       s.traction.row(v) = traction_at(gel, at, v).transpose();
       s.largest_tension = std::max(s.largest_tension, -at.pressure[v]);
-      if (solver.bodies()[owner].elastic) s.object_gives[v] = -at.given(v, 2) / gel.rest.weight[v];
+      if (solver.bodies()[owner].elastic) {
+        s.object_gives[v] = -gel.rest.normals[v].dot(at.given.row(v)) / gel.rest.weight[v];
+      }
       const double mu = friction(owner);
       if (std::isfinite(mu) && mu > 0.0 && largest > 0.0) {
         const double excess = at.shear.row(v).norm() - mu * std::max(0.0, at.pressure[v]);

@@ -217,7 +217,7 @@ std::optional<double> finest_detail(const ObjectSpec& object) {
   return *middle;
 }
 
-/// @pre the gel isn't gentle
+/// @pre the gel doesn't take fine relief
 std::string shape_in_words(const GelSpec& gel) {
   const DomeSpec* dome = gel.dome();
   if (dome == nullptr) return "this gel is neither";
@@ -241,7 +241,7 @@ void plan_relief(const SceneSpec& scene, Plan& plan, PlanTable& table) {
                                    : !scene.device.coating && scene.outputs.camera()
                                        ? "that a camera sees through a clear gel"
                                        : "";
-  const bool shows_slopes = scene.device.coating && scene.outputs.camera() && is_gentle(scene.device.gel) &&
+  const bool shows_slopes = scene.device.coating && scene.outputs.camera() && takes_fine_relief(scene.device.gel) &&
                             scene.more_objects.empty() && unfit_object.empty();
   const std::string why =
       shows_slopes && !fine ? "a coating shows the surface's slope, which the gel's mesh has to some degrees only"
@@ -261,8 +261,8 @@ void plan_relief(const SceneSpec& scene, Plan& plan, PlanTable& table) {
     fail_at(scene.where, "fine relief isn't simulated with an elastic object {}; switch one of them off in effects",
             unfit_object);
   }
-  if ((plan.fine_relief || scene.outputs.height) && !is_gentle(scene.device.gel)) {
-    fail_at(scene.where, "{} is for flat and gently domed gels only (up to {:.3g} degrees of slope); {}{}",
+  if ((plan.fine_relief || scene.outputs.height) && !takes_fine_relief(scene.device.gel)) {
+    fail_at(scene.where, "{} is for flat and domed gels only (domes up to {:.3g} degrees of slope); {}{}",
             plan.fine_relief ? "fine relief" : "outputs.height", fem::kSteepestDome / kRadiansPerDegree,
             shape_in_words(scene.device.gel), plan.fine_relief ? "; effects.fine_relief: off leaves it out" : "");
   }

@@ -70,10 +70,22 @@ double rest_height(const GelSpec& gel, const Eigen::Vector2d& place) {
   return std::sqrt(sphere * sphere - across * across) - sphere;
 }
 
-bool is_gentle(const GelSpec& gel) {
+namespace {
+
+bool is_no_steeper(const GelSpec& gel, double slope) {
   const DomeSpec* dome = gel.dome();
-  return gel.slab() != nullptr ||
-         (dome != nullptr && dome->base_radius_mm <= std::sin(fem::kSteepestDome) * dome->sphere_radius_mm);
+  return gel.slab() != nullptr || (dome != nullptr && dome->base_radius_mm <= std::sin(slope) * dome->sphere_radius_mm);
+}
+
+}  // namespace
+
+bool takes_fine_relief(const GelSpec& gel) {
+  return is_no_steeper(gel, fem::kSteepestDome);
+}
+
+bool is_gentle(const GelSpec& gel) {
+  constexpr double kGentle_rad = 0.5;
+  return is_no_steeper(gel, kGentle_rad);
 }
 
 bool ends_on_plate(const GelSpec& gel) {

@@ -33,7 +33,12 @@ std::optional<RoundFace> round_face(const GelSpec& gel);
 /// of the rim. @pre the gel isn't a mesh
 double rest_height(const GelSpec& gel, const Eigen::Vector2d& place);
 
-/// Is the outer surface flat, or a dome so gentle that fine relief (fem/fine_relief/fine_relief.h) can have it?
+/// Is the outer surface flat, or a dome that fine relief (fem/fine_relief/fine_relief.h) can have: no steeper at its
+/// rim than fem::kSteepestDome?
+bool takes_fine_relief(const GelSpec& gel);
+
+/// Is the outer surface flat, or a dome so gentle that what has moved on it may be followed over x and y alone: no
+/// steeper than 0.5 rad?
 bool is_gentle(const GelSpec& gel);
 
 /// Is the gel a dome whose rim lies on the plate: a cap without a cylinder?

@@ -92,7 +92,7 @@ SceneSpec scene_with(const DeviceSpec& device, const VirtualSensorSettings& sett
   scene.membrane.pixel_um = settings.membrane_um;
   scene.light.interreflection_tolerance = settings.interreflection_tolerance;
   scene.effects = effects_of(device, settings, object);
-  if (!is_gentle(device.gel)) scene.effects.fine_relief = Switch::off;
+  if (!takes_fine_relief(device.gel)) scene.effects.fine_relief = Switch::off;
   if (scene.effects.fine_relief == Switch::automatic) scene.effects.fine_relief = Switch::on;
   scene.effects.direct_light = direct ? Switch::on : Switch::off;
   return scene;

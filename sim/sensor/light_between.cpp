@@ -60,7 +60,7 @@ std::string unfit_for_light_between(const SceneSpec& scene, const Plan& plan) {
   if (!plan.direct_light) return "there is no direct light";
   if (device.coating->type != CoatingType::matt) return "the coating is of metal";
   if (plan.translucent_coating) return "objects are seen through the coating";
-  if (!is_gentle(device.gel)) return "the gel is neither flat nor a gentle dome";
+  if (!is_gentle(device.gel)) return "the gel is neither flat nor a dome that slopes by 0.5 rad at most";
   const bool scattered = device.coating->print && device.coating->print->pattern == PrintPattern::scattered;
   if (scattered && device.gel.dome() != nullptr) return "the print is laid out along a dome";
   if (device.films) return "there are films before the gel";

@@ -59,8 +59,7 @@ class MilkyView final : public SensorView {
     const auto relief = view.relief(press);
     const fem::ReliefAnswer* fine = relief && relief->grid.nx > 0 ? &*relief : nullptr;
     const fem::HeightField heights(*view.membrane->surface(), press, fine);
-    RigidTransform gel_from_object = press.gel_from_object;
-    if (fine != nullptr) gel_from_object.translation.z() += fine->solved.shift;
+    const RigidTransform gel_from_object = fine != nullptr ? fine->moved(press.gel_from_object) : press.gel_from_object;
     const RigidTransform object_from_gel = gel_from_object.inverse();
     const Eigen::Vector3d up = object_from_gel.turn(Eigen::Vector3d::UnitZ());
     const fem::ContactShape shape = contact_shape(object.spec);

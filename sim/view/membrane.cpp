@@ -77,11 +77,11 @@ std::optional<fem::ReliefAnswer> Membrane::relief(const fem::PressState& press) 
 Membrane::Sheet Membrane::sheet(const fem::PressState& press, const fem::ReliefAnswer& relief) const {
   const fem::PixelGrid& grid = relief.grid;
   TS_ASSERT(grid.size() > 0);
-  Eigen::Vector2d low = surface_->gel().vertices.front().head<2>();
+  Eigen::Vector2d low = surface_->vertices().front();
   Eigen::Vector2d high = low;
-  for (const auto& v : surface_->gel().vertices) {
-    low = low.cwiseMin(v.head<2>());
-    high = high.cwiseMax(v.head<2>());
+  for (const Eigen::Vector2d& v : surface_->vertices()) {
+    low = low.cwiseMin(v);
+    high = high.cwiseMax(v);
   }
   const double widest = 2.0 * surface_->edge();
   const auto x = sheet_lines(grid.first.x(), grid.pitch, grid.nx, low.x(), high.x(), widest);
@@ -97,7 +97,7 @@ Membrane::Sheet Membrane::sheet(const fem::PressState& press, const fem::ReliefA
   std::vector<char> wet(vertices.size(), 0);
   // The lattice goes on beside a dome; there its points are drawn in onto the rim.
   const double rim = surface_->rim_radius();
-  const Eigen::MatrixX3d along_flat = std::isinf(rim) ? relief.along.on_lattice(x, y) : Eigen::MatrixX3d();
+  const Eigen::MatrixX3d along = relief.along.on_lattice(x, y);
   std::vector<char> beside(vertices.size(), 0);
   for (int j = 0; j < rows; ++j) {
     for (int i = 0; i < columns; ++i) {
@@ -105,12 +105,11 @@ Membrane::Sheet Membrane::sheet(const fem::PressState& press, const fem::ReliefA
       Eigen::Vector2d material(x[static_cast<std::size_t>(i)], y[static_cast<std::size_t>(j)]);
       beside[k] = material.norm() >= rim;
       if (beside[k]) material *= rim / material.norm();
-      const Eigen::Vector2d along = std::isinf(rim)
-                                        ? Eigen::Vector2d(along_flat.row(static_cast<Eigen::Index>(k)).head<2>())
-                                        : relief.tangential(material);
-      const double rest_z = surface_->rest_height(material);
-      vertices[k] << material + along, rest_z + field.at_material(material);
-      sheet.rest.emplace_back(material.x(), material.y(), rest_z);
+      const fem::SurfacePlace place = surface_->place(material);
+      vertices[k] = place.point + field.at_material(material) * place.normal;
+      vertices[k] += beside[k] ? relief.tangential(material)
+                               : Eigen::Vector3d(along.row(static_cast<Eigen::Index>(k)).transpose());
+      sheet.rest.push_back(place.point);
       const int gi = i - left;
       const int gj = j - bottom;
       if (gi >= 0 && gj >= 0 && gi < grid.nx && gj < grid.ny) wet[k] = relief.contact[grid.at(gi, gj)];

@@ -15,7 +15,7 @@ namespace touchstone::sim {
 /// The membrane of one scene. Made once; its functions are pure and may be called from several threads.
 class Membrane {
  public:
-  /// @throws Error for a gel whose outer surface is neither flat nor a gentle dome (fem::SmoothSurface), or a height
+  /// @throws Error for a gel whose outer surface is neither flat nor a dome that fem::SmoothSurface takes, or a height
   /// map of more than kMostHeightPixels a side
   Membrane(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel);
   /// The same with the surface of another scene's membrane on the same gel. @throws Error likewise

@@ -189,9 +189,7 @@ std::vector<RigidTransform> poses_of(const fem::PressState& press) {
 }
 
 std::vector<RigidTransform> poses_of(const fem::PressState& press, const fem::ReliefAnswer& relief) {
-  RigidTransform shifted = press.gel_from_object;
-  shifted.translation.z() += relief.solved.shift;
-  return {shifted};
+  return {relief.moved(press.gel_from_object)};
 }
 
 std::vector<PlacedShape> placed_shapes(const std::vector<VisibleObject>& objects, const fem::PressState& press) {

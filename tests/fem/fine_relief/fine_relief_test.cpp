@@ -393,7 +393,7 @@ TEST(FineRelief, RefusesWhatItCantDo) {
     const SmoothSurface surface(domed);
     FAIL() << "no error";
   } catch (const Error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("flat and gently domed gels only"));
+    EXPECT_THAT(error.what(), HasSubstr("flat and domed gels only"));
   }
 }
 
@@ -423,7 +423,7 @@ TEST(FineRelief, AtFiniteStrainItIsNearerToAFinerMeshThanTheMeshsOwnSurface) {
   };
   const BothGels coarse(0.6), fine(0.3);
   const PressState coarse_press = pressed_at(coarse), fine_press = pressed_at(fine);
-  const ReliefSettings pixels{.pitch = 0.05};
+  const ReliefSettings pixels{.pitch = 0.05, .tolerance = {}, .object = {}};
   const ReliefAnswer coarse_relief = solve_fine_relief(*coarse.surface, coarse_press, ball, pixels);
   const ReliefAnswer fine_relief = solve_fine_relief(*fine.surface, fine_press, ball, pixels);
   const HeightField truth(*fine.surface, fine_press, &fine_relief);

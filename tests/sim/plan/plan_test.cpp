@@ -91,14 +91,14 @@ TEST(Plan, AnImageOfAGelThatIsNoSlabIsRefusedAndItsTruthIsnt) {
   }
 }
 
-TEST(Plan, FineReliefAndHeightsOfAGelThatIsNeitherFlatNorAGentleDomeAreRefused) {
+TEST(Plan, FineReliefAndHeightsOfAGelThatIsNeitherFlatNorADomeAreRefused) {
   SceneSpec scene = shipped("cycle.yaml");
   scene.outputs = {};
   scene.outputs.frames = false;
   scene.device.gel.shape = FingertipSpec{};
   scene.effects.fine_relief = Switch::on;
   EXPECT_THAT(test::message_of([&] { make_plan(scene); }),
-              AllOf(HasSubstr("cycle.yaml:"), HasSubstr("fine relief is for flat and gently domed gels"),
+              AllOf(HasSubstr("cycle.yaml:"), HasSubstr("fine relief is for flat and domed gels"),
                     HasSubstr("effects.fine_relief: off leaves it out")));
   scene.effects.fine_relief = Switch::off;
   EXPECT_EQ(test::message_of([&] { make_plan(scene); }), "no error");
