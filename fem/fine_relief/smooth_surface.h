@@ -104,7 +104,8 @@ class SmoothSurface {
   Eigen::Vector2d laid_out(const Eigen::Vector2d& seen) const;
   /// Height of the undeformed surface over x and y, mm; beside a dome that of its rim.
   double rest_height(const Eigen::Vector2d& seen) const;
-  bool is_flat() const;  ///< not a dome
+  bool is_flat() const;                                    ///< not a dome
+  double sphere_radius() const { return sphere_radius_; }  ///< mm; infinite for a flat surface
   /// Of the dome's rim as it is laid out, mm; infinite for a flat surface.
   double rim_radius() const { return rim_radius_; }
   /// SurfacePlace::scale of each pixel.

@@ -10,8 +10,10 @@
 namespace touchstone::sim {
 namespace {
 
-constexpr double kGrowth = 1.3;     // of the spacing from line to line outside of the relief's grid
-constexpr double kSameLine = 1e-6;  // of a pixel: nearer lines are one but for rounding
+constexpr double kGrowth = 1.3;            // of the spacing from line to line outside of the relief's grid
+constexpr double kSameLine = 1e-6;         // of a pixel: nearer lines are one but for rounding
+constexpr double kDeepestChord_mm = 1e-3;  // that a cell outside of the grid may lie below a dome: a fifth of what an
+                                           // `accuracy` allows heights by default
 
 /// Lines across one axis: the grid's own pixels, and from its border on ever wider ones to the surface's edges. A grid
 /// that ends on an edge, or a part of a pixel beyond it, has no more lines there: else two would be one.
@@ -83,7 +85,8 @@ Membrane::Sheet Membrane::sheet(const fem::PressState& press, const fem::ReliefA
     low = low.cwiseMin(v);
     high = high.cwiseMax(v);
   }
-  const double widest = 2.0 * surface_->edge();
+  // A flat triangle lies below a sphere by the square of its longest side, here a square's diagonal, over eight radii.
+  const double widest = std::min(2.0 * surface_->edge(), std::sqrt(4.0 * kDeepestChord_mm * surface_->sphere_radius()));
   const auto x = sheet_lines(grid.first.x(), grid.pitch, grid.nx, low.x(), high.x(), widest);
   const auto y = sheet_lines(grid.first.y(), grid.pitch, grid.ny, low.y(), high.y(), widest);
   const auto left = static_cast<int>(std::find(x.begin(), x.end(), grid.first.x()) - x.begin());

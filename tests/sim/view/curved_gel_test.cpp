@@ -350,6 +350,10 @@ TEST(CurvedGel, AContactOnASteepFlankIsSeenThere) {
         EXPECT_NEAR((sheet.mesh.vertices[v] - centre).norm(), kRadius, 1e-3);
       }
     }
+    for (int i = 0; i < 3; ++i) {  // else flat cells are heights of their own
+      const Eigen::Vector3d halfway = 0.5 * (sheet.rest[t[i]] + sheet.rest[t[(i + 1) % 3]]);
+      EXPECT_LT(kSteepSphere - (halfway - middle).norm(), 1.001e-3);
+    }
     if (sheet.touched[k] < 0) continue;
     const Eigen::Vector3d a = sheet.mesh.vertices[t[0]];
     touched_area += 0.5 * (sheet.mesh.vertices[t[1]] - a).cross(sheet.mesh.vertices[t[2]] - a).norm();
