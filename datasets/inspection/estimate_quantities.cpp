@@ -48,15 +48,16 @@ bool take_word(std::string& text, std::string_view word) {
   return true;
 }
 
+/// Takes the unit from a name's end; null if there is none.
+const Unit* take_unit(std::string& name) {
+  const auto found = std::ranges::find_if(kUnits, [&](const Unit& unit) { return take_word(name, unit.suffix); });
+  return found == kUnits.end() ? nullptr : &*found;
+}
+
 NameParts name_parts(const std::string& name) {
   NameParts parts;
   parts.stem = name;
-  for (const Unit& unit : kUnits) {
-    if (take_word(parts.stem, unit.suffix)) {
-      parts.unit = unit.printed;
-      break;
-    }
-  }
+  if (const Unit* const unit = take_unit(parts.stem)) parts.unit = unit->printed;
   for (const char* const axis : kAxes) {
     if (take_word(parts.stem, axis)) {
       parts.axis = axis;
@@ -81,10 +82,8 @@ const EstimateColumn* truth_of(const EstimateTable& table, const std::string& na
 }  // namespace
 
 std::string unit_of_column(std::string name) {
-  for (const Unit& unit : kUnits) {
-    if (take_word(name, unit.suffix)) return unit.plain;
-  }
-  return "1";
+  const Unit* const unit = take_unit(name);
+  return unit == nullptr ? "1" : unit->plain;
 }
 
 EstimateParts parts_of(const EstimateTable& table) {

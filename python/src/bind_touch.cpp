@@ -200,9 +200,8 @@ void bind_reading(py::module_& module) {
           "Of the frame: 'normal', 'dark', 'saturated' or 'flat'.")
       .def_property_readonly(
           "trusted", [](const ReadTouch& self) { return self.reading.trusted; },
-          "It has light, markers have their own names, no frame so far has shown that the gel was touched in the frame "
-          "at "
-          "rest, and heights aren't of an overexposed frame.");
+          "It has light, markers have their own names, no frame so far has shown that the gel was touched at rest, and "
+          "heights aren't of an overexposed frame.");
 }
 
 }  // namespace
